@@ -1,0 +1,61 @@
+// The front end: images in, tracks of normalized points out. It does not know that a filter exists.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <memory>
+#include <vector>
+
+#include "ear/calibration.h"
+#include "ear/frontend_config.h"
+#include "ear/types.h"
+
+namespace ear {
+
+/// How the body is thought to have moved from the last frame (B0) to this one (B1), from IMU and odometer.
+struct MotionPrediction {
+  Eigen::Matrix3d R_B1B0 = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d p_B0B1 = Eigen::Vector3d::Zero();  ///< position of B1 in B0 [m]
+  bool rotation_known = false;
+  bool translation_known = false;
+};
+
+/// What the images of one frame are worth.
+struct ImageQuality {
+  double brightness = 0.0;  ///< mean grey value, 0 to 255
+  double sharpness = 0.0;   ///< a measure of blur: larger is sharper
+  int tracked = 0;          ///< features that were seen in the last frame as well
+  int detected = 0;         ///< features new in this frame
+  int stereo = 0;           ///< features seen by both cameras
+  double coverage = 0.0;    ///< share of the image's grid cells that hold a feature, 0 to 1
+};
+
+/// Wall-clock time spent in each step of the last frame [s].
+struct FrontendTiming {
+  double pyramid = 0.0, track = 0.0, detect = 0.0, stereo = 0.0, reject = 0.0;
+};
+
+class Frontend {
+ public:
+  /// Throws std::invalid_argument if there is no camera or a calibration is unusable.
+  Frontend(const FrontendConfig& config, std::vector<CameraCalibration> cameras);
+  ~Frontend();
+  Frontend(Frontend&&) noexcept;
+  Frontend& operator=(Frontend&&) noexcept;
+
+  /// Tracks the last frame's features into this one, associates them across the stereo pair, fills up with new ones.
+  /// The result is valid until the next call. A frame whose images do not fit the calibration throws std::invalid_argument.
+  const FeatureFrame& process(const StereoFrame& frame, const MotionPrediction& prediction);
+
+  [[nodiscard]] const ImageQuality& quality() const;
+  [[nodiscard]] const FrontendTiming& timing() const;
+
+  /// Forgets all tracks; ids go on counting.
+  void reset();
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace ear

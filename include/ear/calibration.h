@@ -1,0 +1,72 @@
+// What a recording or a vehicle says about its sensors: geometry, lenses, noise. Frames: docs/design.md, section 1.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace ear {
+
+/// How a lens bends rays; both models have four coefficients, in OpenCV's order.
+enum class LensModel {
+  radial_tangential,  ///< k1, k2, p1, p2
+  equidistant         ///< k1, k2, k3, k4 (Kannala-Brandt)
+};
+
+struct CameraCalibration {
+  Eigen::Isometry3d T_BC = Eigen::Isometry3d::Identity();  ///< camera (x right, y down, z forward) to body
+  int width = 0;                                           ///< [px]
+  int height = 0;                                          ///< [px]
+  double fu = 0.0, fv = 0.0, cu = 0.0, cv = 0.0;           ///< [px]; the centre of the first pixel is (0, 0)
+  LensModel lens = LensModel::radial_tangential;
+  std::array<double, 4> distortion{};
+  double rate_hz = 0.0;
+};
+
+/// Continuous-time noise of the IMU, EuRoC's keys.
+struct ImuCalibration {
+  double rate_hz = 200.0;
+  double gyro_noise = 1e-3;          ///< [rad/s/sqrt(Hz)]
+  double gyro_random_walk = 2e-5;    ///< [rad/s^2/sqrt(Hz)]
+  double accel_noise = 1e-2;         ///< [m/s^2/sqrt(Hz)]
+  double accel_random_walk = 3e-4;   ///< [m/s^3/sqrt(Hz)]
+};
+
+/// Two wheels on one axle. O is the middle of the axle: x forward, y left along the axle, z up.
+struct EncoderCalibration {
+  Eigen::Isometry3d T_BO = Eigen::Isometry3d::Identity();
+  double rate_hz = 100.0;
+  std::int64_t resolution = 262144;                  ///< counts per revolution
+  bool wraps = true;                                 ///< counts are an angle modulo the resolution, else cumulative
+  std::array<double, 2> wheel_radius{0.075, 0.075};  ///< left, right [m]
+  double wheel_separation = 0.40;                    ///< [m]
+  double noise_counts = 2.0;                         ///< one reading, 1-sigma [count]
+};
+
+struct LaserBeam {
+  std::string name;
+  Eigen::Vector3d p_BL = Eigen::Vector3d::Zero();    ///< where the beam starts [m]
+  Eigen::Vector3d d_B = -Eigen::Vector3d::UnitZ();   ///< its unit direction
+};
+
+struct LaserCalibration {
+  std::vector<LaserBeam> beams;
+  double rate_hz = 50.0;
+  double range_min = 0.02;  ///< [m]
+  double range_max = 4.0;   ///< [m]
+  double noise = 0.004;     ///< 1-sigma [m]
+};
+
+struct Calibration {
+  std::vector<CameraCalibration> cameras;  ///< none, one, or two (left, right)
+  double camera_time_offset = 0.0;         ///< [s] add it to a camera stamp to get IMU time
+  ImuCalibration imu;
+  std::optional<EncoderCalibration> encoder;
+  std::optional<LaserCalibration> lasers;
+};
+
+}  // namespace ear

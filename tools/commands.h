@@ -1,0 +1,14 @@
+// The subcommands of the ear program, one file each. Each adds itself to the command line.
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+namespace ear::tools {
+
+void add_run_command(CLI::App& app);
+void add_simulate_command(CLI::App& app);
+void add_evaluate_command(CLI::App& app);
+void add_check_command(CLI::App& app);
+void add_bench_command(CLI::App& app);
+
+}  // namespace ear::tools
