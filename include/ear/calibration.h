@@ -30,10 +30,10 @@ struct CameraCalibration {
 /// Continuous-time noise of the IMU, EuRoC's keys.
 struct ImuCalibration {
   double rate_hz = 200.0;
-  double gyro_noise = 1e-3;          ///< [rad/s/sqrt(Hz)]
-  double gyro_random_walk = 2e-5;    ///< [rad/s^2/sqrt(Hz)]
-  double accel_noise = 1e-2;         ///< [m/s^2/sqrt(Hz)]
-  double accel_random_walk = 3e-4;   ///< [m/s^3/sqrt(Hz)]
+  double gyro_noise = 1e-3;         ///< [rad/s/sqrt(Hz)]
+  double gyro_random_walk = 2e-5;   ///< [rad/s^2/sqrt(Hz)]
+  double accel_noise = 1e-2;        ///< [m/s^2/sqrt(Hz)]
+  double accel_random_walk = 3e-4;  ///< [m/s^3/sqrt(Hz)]
 };
 
 /// Two wheels on one axle. O is the middle of the axle: x forward, y left along the axle, z up.
@@ -49,8 +49,8 @@ struct EncoderCalibration {
 
 struct LaserBeam {
   std::string name;
-  Eigen::Vector3d p_BL = Eigen::Vector3d::Zero();    ///< where the beam starts [m]
-  Eigen::Vector3d d_B = -Eigen::Vector3d::UnitZ();   ///< its unit direction
+  Eigen::Vector3d p_BL = Eigen::Vector3d::Zero();   ///< where the beam starts [m]
+  Eigen::Vector3d d_B = -Eigen::Vector3d::UnitZ();  ///< its unit direction
 };
 
 struct LaserCalibration {

@@ -1,0 +1,49 @@
+// Settings of the filter. One default set serves all recordings; docs/filter.md gives the reasons and the measurements.
+#pragma once
+
+namespace ear {
+
+/// How the filter recognises that the vehicle stands, and how firmly it then holds the pose.
+struct StandstillConfig {
+  double duration = 0.5;          ///< [s] stillness before it is believed
+  double max_gyro = 0.05;         ///< [rad/s] mean rate, bias removed once it is known (else max_gyro_bias)
+  double max_gyro_spread = 0.06;  ///< [rad/s] standard deviation of the samples over `duration`, vibration included
+  double max_accel_spread = 0.6;  ///< [m/s^2] the same for the specific force
+  double max_flow_px = 0.6;       ///< [px] median motion of the features since the vehicle stopped
+  double position_sigma = 1e-3;   ///< [m] how far a standing vehicle may shift
+  double rotation_sigma = 5e-4;   ///< [rad]
+  double velocity_sigma = 5e-3;   ///< [m/s]
+};
+
+/// Standard deviations at the start, before anything was measured.
+struct PriorConfig {
+  double gyro_bias = 0.02;        ///< [rad/s]
+  double accel_bias = 0.1;        ///< [m/s^2]
+  double camera_rotation = 5e-3;  ///< [rad] camera 0 in the body, where it is estimated
+  double camera_position = 5e-3;  ///< [m]
+  double stereo_rotation = 5e-4;  ///< [rad] camera 1 in camera 0
+  double stereo_position = 2e-4;  ///< [m]
+  double time_offset = 2e-3;      ///< [s] camera against IMU
+};
+
+/// What is calibrated while running. A frozen quantity keeps its value, and its uncertainty is not accounted for.
+struct OnlineCalibrationConfig {
+  bool camera_extrinsics = true;  ///< pose of camera 0 in the body, and of camera 1 in camera 0
+  bool time_offset = true;        ///< camera against IMU
+  double min_rate = 0.1;  ///< [rad/s] below this turn rate nothing is learned: the quantities are only considered
+};
+
+struct FilterConfig {
+  int window = 12;                     ///< clones kept
+  int max_track_updates = 40;          ///< features used per frame, those with most observations first
+  double feature_sigma_px = 0.6;       ///< one observation of one feature, one axis [px]
+  double huber_px = 1.5;               ///< observations further off than this weigh less [px]
+  double gate_probability = 0.997;     ///< chi-square gate of every feature and row
+  double keyframe_parallax_px = 12.0;  ///< a clone with less median parallax to its elder makes room first [px]
+  double max_imu_gap = 0.05;           ///< [s] a longer hole in the IMU data is bridged, counted, and its noise raised
+  PriorConfig prior;
+  StandstillConfig standstill;
+  OnlineCalibrationConfig online_calibration;
+};
+
+}  // namespace ear
