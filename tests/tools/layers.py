@@ -1,0 +1,85 @@
+"""Which layer may include what. check(root) returns one line of text per include that its layer may not see.
+
+Run as a program, it checks the project: layers.py ROOT.
+"""
+
+import re
+import sys
+from pathlib import Path
+
+STANDARD = ["freestanding", "hosted"]  # the C++ library; the filter has only the first, see HOSTED
+
+# What the files of a folder may include: folders (with a slash) and libraries. The longest folder counts.
+LAYERS = {
+    "include/ear/": ["include/ear/", "eigen", *STANDARD],
+    "filter/": ["filter/", "include/ear/", "eigen", "freestanding"],
+    "frontend/": ["frontend/", "include/ear/", "eigen", "opencv", *STANDARD],
+    "src/": ["src/", "filter/", "frontend/", "include/ear/", "eigen", "opencv", "spdlog", *STANDARD],
+    "src/recording/": ["src/recording/", "include/ear/", "eigen", "opencv", "yaml-cpp", "json", "spdlog", *STANDARD],
+    "tools/": ["tools/", "src/", "filter/", "frontend/", "include/ear/", "eigen", "opencv", "yaml-cpp", "json",
+               "spdlog", "cli11", "posix", *STANDARD],
+    # Simulated truth shares no code with the models, and an evaluation does not know what made the estimate.
+    "tools/simulator/": ["tools/simulator/", "include/ear/", "eigen", "opencv", *STANDARD],
+    "tools/evaluation/": ["tools/evaluation/", "include/ear/", "eigen", "json", *STANDARD],
+    "tests/": ["tests/", "tools/", "src/", "filter/", "frontend/", "include/ear/", "eigen", "opencv", "yaml-cpp",
+               "json", "spdlog", "doctest", "posix", *STANDARD],
+    "tests/tools/consumer/": ["include/ear/", "filter/", "eigen", *STANDARD],
+}
+
+# Files, output, clocks and threads: the filter would build for a microcontroller.
+HOSTED = ["atomic", "chrono", "condition_variable", "cstdio", "ctime", "filesystem", "fstream", "future", "iostream",
+          "mutex", "shared_mutex", "thread"]
+
+LIBRARIES = {"Eigen": "eigen", "unsupported": "eigen", "opencv2": "opencv", "yaml-cpp": "yaml-cpp", "spdlog": "spdlog",
+             "nlohmann": "json", "CLI": "cli11", "doctest": "doctest", "sys": "posix"}
+
+INCLUDE = re.compile(r'^\s*#\s*include\s*["<]([^">]+)[">]')
+
+
+def layer_of(file):
+    return max((layer for layer in LAYERS if str(file).startswith(layer)), key=len, default=None)
+
+
+def target_of(root, includer, name):
+    """What an include points at: a file of the project, or the name of a library."""
+    for folder in (includer.parent, Path("."), Path("include")):
+        file = (root / folder / name).resolve()
+        if file.is_file() and file.is_relative_to(root):
+            return str(file.relative_to(root))
+    if "/" in name:
+        return LIBRARIES.get(name.split("/")[0], name)
+    if name.endswith(".h"):
+        return "freestanding" if name in ("stddef.h", "stdint.h") else "posix"
+    return "hosted" if name in HOSTED else "freestanding"
+
+
+def may_see(layer, target):
+    return any(target == seen or (seen.endswith("/") and target.startswith(seen)) for seen in LAYERS[layer])
+
+
+def sources(root):
+    """All C++ files of the project, relative to its root."""
+    for folder in sorted(root.iterdir()):
+        if folder.is_dir() and folder.name not in (".git", "build", "install"):
+            yield from (file.relative_to(root) for file in sorted(folder.rglob("*")) if file.suffix in (".h", ".cpp"))
+
+
+def check(root):
+    root = root.resolve()
+    faults = []
+    for file in sources(root):
+        layer = layer_of(file)
+        if layer is None:
+            faults.append(f"{file}: no entry of LAYERS holds this file")
+            continue
+        for number, line in enumerate((root / file).read_text(encoding="utf-8").splitlines(), start=1):
+            include = INCLUDE.match(line)
+            if include and not may_see(layer, target_of(root, file, include[1])):
+                faults.append(f"{file}:{number}: {layer} may not include {include[1]}")
+    return faults
+
+
+if __name__ == "__main__":
+    found = check(Path(sys.argv[1]))
+    print("\n".join(found) or "layers: every include points the right way")
+    sys.exit(1 if found else 0)
