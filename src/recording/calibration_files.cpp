@@ -1,0 +1,210 @@
+#include "src/recording/calibration_files.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "src/recording/input_error.h"
+#include "src/recording/yaml_map.h"
+
+namespace ear {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::optional<LensModel> lens_model(const std::string& name) {
+  constexpr std::array kRadialTangential{"radial-tangential", "radial_tangential", "radtan", "plumb_bob", "none"};
+  constexpr std::array kEquidistant{"equidistant", "equi", "kannala_brandt", "kannala_brandt4", "fisheye"};
+  const auto among = [&](const auto& names) { return std::find(names.begin(), names.end(), name) != names.end(); };
+  if (among(kRadialTangential)) return LensModel::radial_tangential;
+  if (among(kEquidistant)) return LensModel::equidistant;
+  return std::nullopt;
+}
+
+// Our models have four coefficients. ROS writes a fifth, k3, which is fine as long as it is zero.
+std::array<double, 4> distortion_coefficients(const YamlMap& map, const std::string& key) {
+  const std::vector<double> values = map.numbers(key, 0);
+  if (values.size() < 4) throw map.error(key, std::to_string(values.size()) + " numbers, not 4");
+  if (std::any_of(values.begin() + 4, values.end(), [](double value) { return value != 0.0; })) {
+    throw map.error(key, "more than four coefficients that are not zero");
+  }
+  return {values[0], values[1], values[2], values[3]};
+}
+
+// What EuRoC's sensor.yaml and Kalibr's camchain have in common; they differ in the key of the coefficients.
+CameraCalibration read_lens(const YamlMap& map, const std::string& coefficients_key) {
+  const auto camera_model = map.get_or<std::string>("camera_model", "pinhole");
+  if (camera_model != "pinhole") throw map.error("camera_model", "'" + camera_model + "' is not known: pinhole");
+  const auto lens_name = map.get<std::string>("distortion_model");
+  const std::optional<LensModel> lens = lens_model(lens_name);
+  if (!lens) {
+    throw map.error("distortion_model", "'" + lens_name + "' is not known: radial-tangential, equidistant, none");
+  }
+
+  CameraCalibration camera;
+  const std::vector<double> resolution = map.numbers("resolution", 2);
+  camera.width = static_cast<int>(resolution[0]);
+  camera.height = static_cast<int>(resolution[1]);
+  const std::vector<double> intrinsics = map.numbers("intrinsics", 4);
+  camera.fu = intrinsics[0];
+  camera.fv = intrinsics[1];
+  camera.cu = intrinsics[2];
+  camera.cv = intrinsics[3];
+  camera.lens = *lens;
+  if (lens_name != "none") camera.distortion = distortion_coefficients(map, coefficients_key);
+  camera.rate_hz = map.get_or("rate_hz", 0.0);
+  return camera;
+}
+
+void read_imu_noise(const YamlMap& map, ImuCalibration& imu) {
+  imu.gyro_noise = map.get<double>("gyroscope_noise_density");
+  imu.gyro_random_walk = map.get<double>("gyroscope_random_walk");
+  imu.accel_noise = map.get<double>("accelerometer_noise_density");
+  imu.accel_random_walk = map.get<double>("accelerometer_random_walk");
+}
+
+CameraCalibration read_camera(const fs::path& file) {
+  const YamlMap map = YamlMap::load(file);
+  CameraCalibration camera = read_lens(map, "distortion_coefficients");
+  camera.T_BC = map.pose("T_BS");
+  return camera;
+}
+
+EncoderCalibration read_encoder(const fs::path& file) {
+  const YamlMap map = YamlMap::load(file);
+  EncoderCalibration encoder;
+  encoder.T_BO = map.pose("T_BS");
+  encoder.rate_hz = map.get_or("rate_hz", encoder.rate_hz);
+  encoder.resolution = map.get<std::int64_t>("resolution");
+  encoder.wraps = map.get<bool>("wraps");
+  const std::vector<double> radius = map.numbers("wheel_radius", 2);
+  encoder.wheel_radius = {radius[0], radius[1]};
+  encoder.wheel_separation = map.get<double>("wheel_separation");
+  encoder.noise_counts = map.get<double>("noise_counts");
+  return encoder;
+}
+
+// Digits that were cut off are not a mistake; check_calibration() finds directions that are worse.
+Eigen::Vector3d without_rounding(const Eigen::Vector3d& direction) {
+  constexpr double kRounding = 1e-3;
+  return std::abs(direction.norm() - 1.0) < kRounding ? Eigen::Vector3d(direction.normalized()) : direction;
+}
+
+LaserCalibration read_lasers(const fs::path& file) {
+  const YamlMap map = YamlMap::load(file);
+  LaserCalibration lasers;
+  for (const YamlMap& beam : map.children("beams")) {
+    lasers.beams.push_back(
+        {beam.get<std::string>("name"), beam.vector3("origin"), without_rounding(beam.vector3("direction"))});
+  }
+  if (lasers.beams.empty()) throw map.error("beams", "no beam");
+  lasers.rate_hz = map.get_or("rate_hz", lasers.rate_hz);
+  const std::vector<double> range = map.numbers("range", 2);
+  lasers.range_min = range[0];
+  lasers.range_max = range[1];
+  lasers.noise = map.get<double>("noise");
+  return lasers;
+}
+
+// Kalibr's camchain: T_cam_imu takes a point from the IMU to the camera; T_cn_cnm1 from the camera before to this one.
+void read_camchain(const YamlMap& map, Calibration& calibration) {
+  calibration.cameras.clear();
+  Eigen::Isometry3d T_CB_before = Eigen::Isometry3d::Identity();
+  for (int i = 0; i < 2 && map.has("cam" + std::to_string(i)); ++i) {
+    const YamlMap camera_map = map.child("cam" + std::to_string(i));
+    CameraCalibration camera = read_lens(camera_map, "distortion_coeffs");
+    const bool chained = i > 0 && !camera_map.has("T_cam_imu");
+    const Eigen::Isometry3d T_CB = chained ? camera_map.pose("T_cn_cnm1") * T_CB_before : camera_map.pose("T_cam_imu");
+    camera.T_BC = T_CB.inverse(Eigen::Affine);
+    calibration.cameras.push_back(camera);
+    T_CB_before = T_CB;
+    // t_imu = t_cam + shift, as ours. Both cameras of a pair share one clock: the left one's shift counts.
+    if (i == 0) calibration.camera_time_offset = camera_map.get_or("timeshift_cam_imu", 0.0);
+  }
+}
+
+void read_kalibr_imu(const YamlMap& file_map, Calibration& calibration) {
+  const YamlMap map = file_map.has("imu0") ? file_map.child("imu0") : file_map;
+  read_imu_noise(map, calibration.imu);
+  calibration.imu.rate_hz = map.get_or("update_rate", calibration.imu.rate_hz);
+}
+
+void read_kalibr_file(const fs::path& file, Calibration& calibration) {
+  const YamlMap map = YamlMap::load(file);
+  if (map.has("cam0")) {
+    read_camchain(map, calibration);
+  } else if (map.has("imu0") || map.has("accelerometer_noise_density")) {
+    read_kalibr_imu(map, calibration);
+  } else {
+    throw InputError(located(file, 0, "", "neither Kalibr's camchain (cam0) nor its imu.yaml (noise densities)"));
+  }
+}
+
+bool has_camchain(const std::vector<fs::path>& files) {
+  return std::any_of(files.begin(), files.end(), [](const fs::path& file) { return YamlMap::load(file).has("cam0"); });
+}
+
+bool has_sensor(const fs::path& mav0, const std::string& name) { return fs::is_directory(mav0 / name); }
+
+void read_cameras(const fs::path& mav0, Calibration& calibration) {
+  for (const char* name : {"cam0", "cam1"}) {
+    if (has_sensor(mav0, name)) calibration.cameras.push_back(read_camera(mav0 / name / "sensor.yaml"));
+  }
+}
+
+// Reads imu0/sensor.yaml and returns its T_BS: IMU to the body of the files.
+Eigen::Isometry3d read_imu(const fs::path& file, ImuCalibration& imu) {
+  const YamlMap map = YamlMap::load(file);
+  read_imu_noise(map, imu);
+  imu.rate_hz = map.get_or("rate_hz", imu.rate_hz);
+  return map.has("T_BS") ? map.pose("T_BS") : Eigen::Isometry3d::Identity();
+}
+
+// Our body is the IMU; the body of the files, F, may be another one.
+void express_in_imu_frame(const Eigen::Isometry3d& T_FB, Calibration& calibration) {
+  const Eigen::Isometry3d T_BF = T_FB.inverse(Eigen::Affine);
+  for (CameraCalibration& camera : calibration.cameras) camera.T_BC = T_BF * camera.T_BC;
+  if (calibration.encoder) calibration.encoder->T_BO = T_BF * calibration.encoder->T_BO;
+  if (!calibration.lasers) return;
+  for (LaserBeam& beam : calibration.lasers->beams) {
+    beam.p_BL = T_BF * beam.p_BL;
+    beam.d_B = T_BF.linear() * beam.d_B;
+  }
+}
+
+}  // namespace
+
+Calibration load_calibration(const fs::path& mav0, const std::vector<fs::path>& kalibr_files, Warnings& warnings) {
+  Calibration calibration;
+  const bool kalibr_cameras = has_camchain(kalibr_files);
+  if (!kalibr_cameras) read_cameras(mav0, calibration);
+  if (has_sensor(mav0, "encoder0")) calibration.encoder = read_encoder(mav0 / "encoder0" / "sensor.yaml");
+  if (has_sensor(mav0, "laser0")) calibration.lasers = read_lasers(mav0 / "laser0" / "sensor.yaml");
+
+  const fs::path imu_file = mav0 / "imu0" / "sensor.yaml";
+  if (fs::exists(imu_file) || kalibr_files.empty()) {
+    const Eigen::Isometry3d T_FB = read_imu(imu_file, calibration.imu);
+    if (!T_FB.isApprox(Eigen::Isometry3d::Identity(), 1e-6)) {
+      express_in_imu_frame(T_FB, calibration);
+      warnings.add("calibration: body is not the IMU",
+                   located(imu_file, 0, "T_BS", "not the identity; all poses are turned into the IMU's frame"));
+    }
+  }
+  // Kalibr's cameras are already relative to the IMU.
+  for (const fs::path& file : kalibr_files) read_kalibr_file(file, calibration);
+
+  const std::size_t folders = has_sensor(mav0, "cam0") ? (has_sensor(mav0, "cam1") ? 2 : 1) : 0;
+  if (calibration.cameras.size() > folders) calibration.cameras.resize(folders);
+  return calibration;
+}
+
+Calibration load_kalibr(const fs::path& camchain, const fs::path& imu) {
+  Calibration calibration;
+  const YamlMap map = YamlMap::load(camchain);
+  if (!map.has("cam0")) throw map.error("cam0", "missing");
+  read_camchain(map, calibration);
+  read_kalibr_imu(YamlMap::load(imu), calibration);
+  return calibration;
+}
+
+}  // namespace ear

@@ -1,0 +1,66 @@
+#include "src/recording/frame_list.h"
+
+#include <cmath>
+#include <cstdlib>
+
+namespace ear {
+namespace {
+
+// Triggered cameras share their stamps exactly; drivers that stamp each image on arrival differ a little.
+constexpr TimeNs kSameTime = 3'000'000;
+
+std::filesystem::path csv_of(const std::filesystem::path& mav0, const char* camera) {
+  return mav0 / camera / "data.csv";
+}
+
+}  // namespace
+
+FrameList::FrameList(const std::filesystem::path& mav0, bool stereo, double camera_rate_hz)
+    : mav0_(mav0), left_(csv_of(mav0, "cam0"), "cam0", parse_image_row), camera_rate_hz_(camera_rate_hz) {
+  if (stereo) right_ = std::make_unique<SampleStream<ImageRow>>(csv_of(mav0, "cam1"), "cam1", parse_image_row);
+}
+
+std::optional<FrameFiles> FrameList::next(Warnings& warnings) {
+  while (std::optional<FrameFiles> frame = next_pair(warnings)) {
+    if (due(frame->t_ns)) return frame;
+  }
+  return std::nullopt;
+}
+
+std::optional<FrameFiles> FrameList::next_pair(Warnings& warnings) {
+  const std::optional<ImageRow> left = left_.next(warnings);
+  if (!left) return std::nullopt;
+  FrameFiles frame{left->t_ns, mav0_ / "cam0" / "data" / left->filename, {}};
+  if (right_) frame.right = matching_right(left->t_ns, warnings);
+  return frame;
+}
+
+std::filesystem::path FrameList::matching_right(TimeNs t_ns, Warnings& warnings) {
+  if (!right_ahead_) right_ahead_ = right_->next(warnings);
+  while (right_ahead_ && right_ahead_->t_ns < t_ns - kSameTime) {
+    warnings.add("cam1: image without a left one",
+                 located(right_->file(), 0, std::to_string(right_ahead_->t_ns), "no image of cam0 at this time"));
+    right_ahead_ = right_->next(warnings);
+  }
+  if (!right_ahead_ || right_ahead_->t_ns > t_ns + kSameTime) {
+    warnings.add("cam0: image without a right one",
+                 located(left_.file(), 0, std::to_string(t_ns), "no image of cam1 at this time"));
+    return {};
+  }
+  const std::filesystem::path file = mav0_ / "cam1" / "data" / right_ahead_->filename;
+  right_ahead_.reset();
+  return file;
+}
+
+// Time is cut into slots of one wanted period, and the first frame of each slot is used. The slots begin a quarter
+// period early, so that a frame whose stamp trembles around the border stays in its slot.
+bool FrameList::due(TimeNs t_ns) {
+  if (camera_rate_hz_ <= 0.0) return true;
+  if (!first_ns_) first_ns_ = t_ns;
+  const auto slot = static_cast<std::int64_t>(std::floor(seconds_between(*first_ns_, t_ns) * camera_rate_hz_ + 0.25));
+  if (last_slot_ && slot == *last_slot_) return false;
+  last_slot_ = slot;
+  return true;
+}
+
+}  // namespace ear

@@ -1,0 +1,87 @@
+#include "src/recording/rows.h"
+
+#include <cmath>
+#include <limits>
+
+#include "src/recording/sample_stream.h"
+
+namespace ear {
+namespace {
+
+[[noreturn]] void malformed(const std::string& column, std::string_view field, const char* expected) {
+  throw RowError{RowError::Kind::malformed, column, "'" + std::string(field) + "' is not " + expected};
+}
+
+void require_columns(const CsvRow& row, std::size_t count) {
+  if (row.fields.size() >= count) return;
+  throw RowError{RowError::Kind::malformed, "line",
+                 std::to_string(row.fields.size()) + " fields, not " + std::to_string(count)};
+}
+
+TimeNs stamp(const CsvRow& row) {
+  const auto t_ns = parse_integer(row.fields[0]);
+  if (!t_ns) malformed("timestamp", row.fields[0], "a whole number of nanoseconds");
+  return *t_ns;
+}
+
+double number(const CsvRow& row, std::size_t index, const std::string& column) {
+  const auto value = parse_double(row.fields[index]);
+  if (!value) malformed(column, row.fields[index], "a number");
+  return *value;
+}
+
+double finite_number(const CsvRow& row, std::size_t index, const char* column) {
+  const double value = number(row, index, column);
+  if (!std::isfinite(value)) throw RowError{RowError::Kind::not_finite, column, std::string(row.fields[index])};
+  return value;
+}
+
+std::int64_t count(const CsvRow& row, std::size_t index, const char* column) {
+  if (const auto whole = parse_integer(row.fields[index])) return *whole;
+  const double value = finite_number(row, index, column);  // some programs write every number with a point
+  if (std::abs(value) > 9e15) malformed(column, row.fields[index], "a number of counts");
+  return std::llround(value);
+}
+
+}  // namespace
+
+ImuSample parse_imu_row(const CsvRow& row) {
+  require_columns(row, 7);
+  ImuSample sample;
+  sample.t_ns = stamp(row);
+  sample.gyro_B << finite_number(row, 1, "w_x"), finite_number(row, 2, "w_y"), finite_number(row, 3, "w_z");
+  sample.accel_B << finite_number(row, 4, "a_x"), finite_number(row, 5, "a_y"), finite_number(row, 6, "a_z");
+  return sample;
+}
+
+EncoderSample parse_encoder_row(const CsvRow& row) {
+  require_columns(row, 3);
+  return {stamp(row), count(row, 1, "left"), count(row, 2, "right")};
+}
+
+LaserSample parse_laser_row(const CsvRow& row, const LaserCalibration& lasers) {
+  const std::size_t beams = lasers.beams.size();
+  if (row.fields.size() != beams + 1) {
+    throw RowError{RowError::Kind::malformed, "line",
+                   std::to_string(row.fields.size()) + " fields, not a timestamp and " + std::to_string(beams) +
+                       " beams as in sensor.yaml"};
+  }
+  LaserSample sample;
+  sample.t_ns = stamp(row);
+  sample.range.reserve(beams);
+  for (std::size_t i = 0; i < beams; ++i) {
+    const double range = number(row, i + 1, lasers.beams[i].name);
+    const bool hit = range >= lasers.range_min && range <= lasers.range_max;
+    sample.range.push_back(hit ? range : std::numeric_limits<double>::quiet_NaN());
+  }
+  return sample;
+}
+
+ImageRow parse_image_row(const CsvRow& row) {
+  require_columns(row, 2);
+  const TimeNs t_ns = stamp(row);
+  if (row.fields[1].empty()) malformed("filename", row.fields[1], "a file name");
+  return {t_ns, std::string(row.fields[1])};
+}
+
+}  // namespace ear
