@@ -5,19 +5,20 @@ namespace ear {
 
 /// How the filter recognises that the vehicle stands, and how firmly it then holds the pose.
 struct StandstillConfig {
-  double duration = 0.5;          ///< [s] stillness before it is believed
-  double max_gyro = 0.05;         ///< [rad/s] mean rate, bias removed once it is known (else max_gyro_bias)
-  double max_gyro_spread = 0.06;  ///< [rad/s] standard deviation of the samples over `duration`, vibration included
-  double max_accel_spread = 0.6;  ///< [m/s^2] the same for the specific force
-  double max_flow_px = 0.6;       ///< [px] median motion of the features since the vehicle stopped
-  double position_sigma = 1e-3;   ///< [m] how far a standing vehicle may shift
-  double rotation_sigma = 5e-4;   ///< [rad]
-  double velocity_sigma = 5e-3;   ///< [m/s]
+  double duration = 0.5;           ///< [s] stillness before it is believed
+  double max_gyro = 0.02;          ///< [rad/s] mean rate less the bias
+  double max_gyro_at_start = 0.2;  ///< [rad/s] the same before the bias is known: the largest bias of any sensor
+  double max_gyro_spread = 0.06;   ///< [rad/s] standard deviation of the samples over `duration`, vibration included
+  double max_accel_spread = 0.6;   ///< [m/s^2] the same for the specific force
+  double max_flow_px = 0.3;        ///< [px] median motion of the features since the vehicle stopped
+  double position_sigma = 1e-3;    ///< [m] how far a standing vehicle may shift
+  double rotation_sigma = 5e-4;    ///< [rad]
+  double velocity_sigma = 5e-3;    ///< [m/s]
 };
 
 /// Standard deviations at the start, before anything was measured.
 struct PriorConfig {
-  double gyro_bias = 0.02;        ///< [rad/s]
+  double gyro_bias = 0.1;         ///< [rad/s]
   double accel_bias = 0.1;        ///< [m/s^2]
   double camera_rotation = 5e-3;  ///< [rad] camera 0 in the body, where it is estimated
   double camera_position = 5e-3;  ///< [m]

@@ -1,0 +1,77 @@
+// What one tracked feature says about the window, with the feature itself eliminated. Derivation: docs/filter.md, 3.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "filter/state.h"
+#include "filter/tracks.h"
+#include "filter/triangulation.h"
+
+namespace ear {
+
+/// Position of a camera of a clone in the world; what all features of a frame share.
+struct CameraPose {
+  Eigen::Matrix3d R_CW;
+  Eigen::Vector3d p_WC;
+};
+
+/// One observation of a feature, linearized, not yet whitened: residual = H_camera e_cal + H_clone e_clone + H_f f + n.
+struct LinearizedObservation {
+  int clone = 0;
+  Eigen::Vector2d residual;                    ///< measured - predicted, normalized coordinates
+  Eigen::Matrix<double, 2, 12> H_calibration;  ///< phi, p of camera 0 in B; phi, p of camera 1 in camera 0
+  Eigen::Matrix<double, 2, err::clone_size> H_clone;
+  Eigen::Matrix<double, 2, 3> H_f;  ///< feature times its inverse depth, world axes
+};
+
+/// Poses of both cameras for every clone: index 2 * clone + camera.
+void camera_poses(const State& x, std::vector<CameraPose>& poses);
+
+/// Linearizes the observation of `point` in camera 0 or 1 of clone number `clone`.
+[[nodiscard]] LinearizedObservation linearize_observation(const State& x, int clone, int camera,
+                                                          const InverseDepthPoint& point, const Eigen::Vector2d& uv);
+
+/// All features of one frame, summed up as the information A = H^T H, b = H^T r over the camera's part of the error
+/// vector (err::camera and what follows), whitened, each feature projected out. This equals the projection on the null
+/// space of H_f followed by a QR compression, at a fraction of the cost: the sums have the window's size, not the
+/// number of rows.
+class FeatureInformation {
+ public:
+  FeatureInformation(int max_clones, int max_features);
+
+  /// Starts a frame. `error_size`: that of the state.
+  void start(int error_size);
+
+  /// Adds a feature. `sigma`: one observation, normalized; `huber`: the distance in sigmas from which observations
+  /// weigh less. `P`: the covariance; `gate`: the chi-square quantile per degree of freedom count, gate(dof). Returns
+  /// false, and adds nothing, if the feature fails the gate.
+  template <typename Gate>
+  bool add(const std::vector<LinearizedObservation>& observations, double sigma, double huber,
+           const Eigen::Ref<const Eigen::MatrixXd>& P, const Gate& gate) {
+    const int dof = 2 * static_cast<int>(observations.size()) - 3;
+    return dof > 0 && add_gated(observations, sigma, huber, P, gate(dof));
+  }
+
+  /// Rows equivalent to all features added: residual = H e + n, cov(n) = I. Empty if there were none. Valid until
+  /// start().
+  void compress();
+  [[nodiscard]] Eigen::Ref<const Eigen::MatrixXd> H() const { return H_.topLeftCorner(rows_, size_); }
+  [[nodiscard]] Eigen::Ref<const Eigen::VectorXd> residual() const { return r_.head(rows_); }
+
+ private:
+  bool add_gated(const std::vector<LinearizedObservation>& observations, double sigma, double huber,
+                 const Eigen::Ref<const Eigen::MatrixXd>& P, double threshold);
+  [[nodiscard]] double chi_squared(const Eigen::Ref<const Eigen::MatrixXd>& P, double residual_cost);
+
+  int size_ = 0;      // columns: the camera's part of the error vector
+  int features_ = 0;  // in W_
+  int rows_ = 0;
+  Eigen::MatrixXd A_, W_, H_;  // W_: H^T H_f V^-1/2 of each feature, 3 columns each
+  Eigen::VectorXd b_, r_;
+  Eigen::MatrixXd feature_A_;  // of the feature at hand, before projection
+  Eigen::VectorXd feature_b_;
+  Eigen::MatrixXd gate_A_, gate_M_;
+};
+
+}  // namespace ear

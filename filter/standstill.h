@@ -1,0 +1,37 @@
+// Does the vehicle stand? The IMU must be quiet and the features must stay where they were when it stopped: a vehicle
+// that glides at constant speed has a quiet IMU too.
+#pragma once
+
+#include <vector>
+
+#include "ear/filter_config.h"
+#include "ear/types.h"
+#include "filter/imu_buffer.h"
+
+namespace ear {
+
+class StandstillDetector {
+ public:
+  /// `focal_px`: pixels per unit of normalized image coordinates.
+  StandstillDetector(const StandstillConfig& config, double focal_px) : config_(config), focal_px_(focal_px) {}
+
+  /// Looks at one frame. `imu`: the samples of the last config.duration seconds. `gyro_bias` [rad/s]; `max_gyro`
+  /// [rad/s]: how far the mean rate may be from it. True if the vehicle has stood for config.duration.
+  bool update(const FeatureFrame& frame, const ImuStatistics& imu, const Eigen::Vector3d& gyro_bias, double max_gyro);
+
+  void reset() { since_ns_ = kMoving; }
+
+ private:
+  static constexpr TimeNs kMoving = -1;
+
+  void restart(const FeatureFrame& frame);
+  [[nodiscard]] double median_flow_px(const FeatureFrame& frame);
+
+  StandstillConfig config_;
+  double focal_px_;
+  TimeNs since_ns_ = kMoving;                  ///< first frame of the present stillness
+  std::vector<FeatureObservation> reference_;  ///< features of that frame, by ascending id
+  std::vector<double> flow_;
+};
+
+}  // namespace ear

@@ -1,0 +1,73 @@
+// The state, and what an error of it means. Only boxplus and boxminus know the error's definition (docs/filter.md, 1):
+//   R = Exp(theta) R^, v = Exp(theta) v^ + nu, p = Exp(theta) p^ + rho; clones alike; biases and calibration additive,
+//   rotations of the calibration R = Exp(phi) R^.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "ear/types.h"
+#include "filter/so3.h"
+
+namespace ear {
+
+inline const Eigen::Vector3d kGravity_W{0.0, 0.0, -9.81};  ///< [m/s^2]
+
+/// Where each quantity's error stands in the error vector. The camera's part is last, so that its measurements touch
+/// one contiguous range: the calibration of the cameras, then the clones, oldest first.
+namespace err {
+inline constexpr int theta = 0, nu = 3, rho = 6, b_g = 9, b_a = 12;
+inline constexpr int imu_size = 15;
+inline constexpr int camera = imu_size;         ///< phi, p of camera 0 in the body: 6
+inline constexpr int stereo = camera + 6;       ///< phi, p of camera 1 in camera 0: 6
+inline constexpr int time_offset = stereo + 6;  ///< [s]
+inline constexpr int calibration_size = 13;
+inline constexpr int clones = camera + calibration_size;
+inline constexpr int clone_size = 6;  ///< theta, rho
+[[nodiscard]] constexpr int clone(int index) { return clones + clone_size * index; }
+}  // namespace err
+
+struct Pose {
+  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d p = Eigen::Vector3d::Zero();
+};
+
+/// The inertial part: what IMU samples propagate.
+struct ImuState {
+  TimeNs t_ns = 0;
+  Eigen::Matrix3d R_WB = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d v_W = Eigen::Vector3d::Zero();
+  Eigen::Vector3d p_WB = Eigen::Vector3d::Zero();
+  Eigen::Vector3d b_g = Eigen::Vector3d::Zero();
+  Eigen::Vector3d b_a = Eigen::Vector3d::Zero();
+};
+
+/// The cameras' geometry as the filter knows it.
+struct CameraState {
+  Pose T_BC0;                ///< camera 0 to body
+  Pose T_C0C1;               ///< camera 1 to camera 0
+  double time_offset = 0.0;  ///< [s] add to a camera stamp to get IMU time
+};
+
+/// The body's pose at a past frame.
+struct Clone {
+  std::uint64_t frame = 0;  ///< number of the frame, never used again
+  Pose T_WB;
+};
+
+struct State {
+  ImuState imu;
+  CameraState camera;
+  std::vector<Clone> clones;  ///< oldest first
+
+  [[nodiscard]] int error_size() const { return err::clone(static_cast<int>(clones.size())); }
+};
+
+/// x with the error d applied; d has x.error_size() entries.
+void boxplus_in_place(State& x, const Eigen::Ref<const Eigen::VectorXd>& d);
+[[nodiscard]] State boxplus(const State& x, const Eigen::Ref<const Eigen::VectorXd>& d);
+
+/// The error d for which boxplus(estimate, d) is `truth`. Both have the same clones.
+[[nodiscard]] Eigen::VectorXd boxminus(const State& truth, const State& estimate);
+
+}  // namespace ear
