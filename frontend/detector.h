@@ -1,0 +1,41 @@
+// New features where there are none: FAST corners in the emptiest cells of a grid, ranked by how well they can be tracked.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "frontend/image_pyramid.h"
+
+namespace ear {
+
+/// A place where a feature could be tracked.
+struct Corner {
+  Eigen::Vector2f pixel = Eigen::Vector2f::Zero();
+  float strength = 0.0F;  ///< smaller eigenvalue of the structure matrix of its surrounding [grey^2]
+};
+
+class Detector {
+ public:
+  /// Cells are square, about as many as features are wanted.
+  Detector(int width, int height, int max_features);
+
+  /// Up to `wanted` corners, far enough from each other and from the `taken` pixels; emptiest cells first, and in turn.
+  [[nodiscard]] std::vector<Corner> detect(const ImagePyramid& pyramid, const std::vector<Eigen::Vector2f>& taken,
+                                           int wanted);
+
+  /// Share of cells that hold one of the pixels, 0 to 1.
+  [[nodiscard]] double coverage(const std::vector<Eigen::Vector2f>& pixels) const;
+
+ private:
+  [[nodiscard]] std::vector<int> count_per_cell(const std::vector<Eigen::Vector2f>& pixels) const;
+
+  int width_;
+  int height_;
+  int columns_;
+  int rows_;
+  float cell_;              // [px]
+  float min_distance_;      // [px]
+  std::size_t next_ = 0;    // cell to begin with: a different one each time
+};
+
+}  // namespace ear

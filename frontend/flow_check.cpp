@@ -1,0 +1,235 @@
+#include "frontend/flow_check.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <opencv2/calib3d.hpp>
+#include <opencv2/core/mat.hpp>
+#include <optional>
+
+namespace ear {
+namespace {
+
+constexpr std::size_t kMinFlows = 8;        // fewer say nothing about a common motion
+constexpr std::size_t kMinDepths = 8;       // to measure the translation with its length
+constexpr int kMaxTrials = 60;
+constexpr double kConfidence = 0.999;
+constexpr double kGoodGuess = 0.8;          // share of inliers at which a known motion needs no search
+constexpr double kUnknownDepthSigma = 3.0;  // [1/m] a feature without depth may be anywhere beyond 0.2 m or so
+constexpr int kRefinements = 3;
+
+using Vector6d = Eigen::Matrix<double, 6, 1>;
+using Matrix6d = Eigen::Matrix<double, 6, 6>;
+using Flags = std::vector<std::uint8_t>;
+
+std::size_t count(const Flags& flags) {
+  return static_cast<std::size_t>(std::count(flags.begin(), flags.end(), std::uint8_t{1}));
+}
+
+// Squared distance between where a static feature would be and where it is; free along the line on which the
+// uncertain depth moves it.
+double squared_distance(const Flow& flow, const Transfer& motion, double depth_sigma_unknown) {
+  const double sigma = flow.has_depth ? flow.inverse_depth_sigma : depth_sigma_unknown;
+  const Eigen::Vector3d point = motion.scaled_point(flow.x0, flow.has_depth ? flow.inverse_depth0 : 0.0);
+  if (!(point.z() > 1e-3)) return std::numeric_limits<double>::infinity();
+  const Eigen::Vector2d at = point.head<2>() / point.z();
+  const Eigen::Vector2d error = flow.x1 - at;
+  const Eigen::Vector2d along = sigma * (motion.p_10.head<2>() - at * motion.p_10.z()) / point.z();
+  const double projection = along.dot(error);
+  // The error's variance is the unit of distance plus `along along^T`; the unit is small against it where it matters.
+  constexpr double kUnit = 1e-6;  // (0.4 px)^2 at 400 px focal length
+  return error.squaredNorm() - projection * projection / (kUnit + along.squaredNorm());
+}
+
+// Everything that is fixed during one check.
+struct Problem {
+  const std::vector<Flow>& flows;
+  double tolerance;
+  double depth_sigma_unknown = kUnknownDepthSigma;
+
+  [[nodiscard]] Flags classify(const Transfer& motion) const {
+    Flags flags(flows.size());
+    std::transform(flows.begin(), flows.end(), flags.begin(), [&](const Flow& flow) {
+      return std::uint8_t{squared_distance(flow, motion, depth_sigma_unknown) < tolerance * tolerance};
+    });
+    return flags;
+  }
+};
+
+// Gauss-Newton over rotation and translation, on the given flows with depth.
+std::optional<Transfer> refine(const std::vector<Flow>& flows, const Flags& used, Transfer motion, int steps) {
+  for (int step = 0; step < steps; ++step) {
+    Matrix6d information = Matrix6d::Zero();
+    Vector6d gradient = Vector6d::Zero();
+    for (std::size_t i = 0; i < flows.size(); ++i) {
+      const Flow& flow = flows[i];
+      if (!used[i] || !flow.has_depth) continue;
+      const Eigen::Vector3d point = motion.scaled_point(flow.x0, flow.inverse_depth0);
+      if (!(point.z() > 1e-3)) continue;
+      const double inverse_z = 1.0 / point.z();
+      const Eigen::Vector2d at = point.head<2>() * inverse_z;
+      Eigen::Matrix<double, 2, 3> J_at_point;
+      J_at_point << inverse_z, 0.0, -at.x() * inverse_z, 0.0, inverse_z, -at.y() * inverse_z;
+      const Eigen::Vector3d turned = point - flow.inverse_depth0 * motion.p_10;
+      Eigen::Matrix3d minus_skew;
+      minus_skew << 0.0, turned.z(), -turned.y(), -turned.z(), 0.0, turned.x(), turned.y(), -turned.x(), 0.0;
+      Eigen::Matrix<double, 2, 6> J;
+      J << J_at_point * minus_skew, flow.inverse_depth0 * J_at_point;
+      const Eigen::Vector2d error = flow.x1 - at;
+      information.noalias() += J.transpose() * J;
+      gradient.noalias() += J.transpose() * error;
+    }
+    information.diagonal().array() += 1e-9;
+    const Vector6d change = information.ldlt().solve(gradient);
+    if (!change.allFinite()) return std::nullopt;
+    const double angle = change.head<3>().norm();
+    if (angle > 1e-12) {
+      motion.R_10 = Eigen::AngleAxisd(angle, change.head<3>() / angle).toRotationMatrix() * motion.R_10;
+    }
+    motion.p_10 += change.tail<3>();
+  }
+  return motion;
+}
+
+// Translation from flows with depth and a known rotation: linear, two equations each.
+std::optional<Eigen::Vector3d> solve_translation(const std::vector<Flow>& flows, std::size_t a, std::size_t b,
+                                                 const Eigen::Matrix3d& R_10) {
+  Eigen::Matrix3d information = 1e-9 * Eigen::Matrix3d::Identity();
+  Eigen::Vector3d right = Eigen::Vector3d::Zero();
+  for (const std::size_t i : {a, b}) {
+    const Flow& flow = flows[i];
+    const Eigen::Vector3d far = R_10 * flow.x0.homogeneous();
+    Eigen::Matrix<double, 2, 3> J;
+    J << 1.0, 0.0, -flow.x1.x(), 0.0, 1.0, -flow.x1.y();
+    information.noalias() += flow.inverse_depth0 * flow.inverse_depth0 * J.transpose() * J;
+    right.noalias() -= flow.inverse_depth0 * J.transpose() * (J * far);
+  }
+  const Eigen::Vector3d p = information.ldlt().solve(right);
+  if (!p.allFinite()) return std::nullopt;
+  return p;
+}
+
+// Direction of the translation from two flows without depth and a known rotation.
+std::optional<Eigen::Vector3d> solve_direction(const std::vector<Flow>& flows, std::size_t a, std::size_t b,
+                                               const Eigen::Matrix3d& R_10) {
+  const auto plane_normal = [&](const Flow& flow) -> Eigen::Vector3d {
+    return flow.x1.homogeneous().cross(R_10 * flow.x0.homogeneous());
+  };
+  const Eigen::Vector3d p = plane_normal(flows[a]).cross(plane_normal(flows[b]));
+  const double length = p.norm();
+  if (!(length > 1e-12)) return std::nullopt;
+  return p / length;
+}
+
+// Distinct random members of `from`.
+template <std::size_t n>
+std::array<std::size_t, n> draw(const std::vector<std::size_t>& from, std::mt19937& random) {
+  std::array<std::size_t, n> drawn{};
+  for (std::size_t k = 0; k < n; ++k) {
+    do {
+      // Not a standard distribution: those differ between standard libraries.
+      drawn[k] = from[random() % from.size()];
+    } while (std::find(drawn.begin(), drawn.begin() + static_cast<std::ptrdiff_t>(k), drawn[k]) !=
+             drawn.begin() + static_cast<std::ptrdiff_t>(k));
+  }
+  return drawn;
+}
+
+int trials_needed(std::size_t inliers, std::size_t all, std::size_t sample_size) {
+  const double share = static_cast<double>(inliers) / static_cast<double>(all);
+  const double good = std::pow(share, static_cast<double>(sample_size));
+  if (good > 1.0 - 1e-9) return 1;
+  if (good < 1e-9) return kMaxTrials;
+  return std::min(kMaxTrials, static_cast<int>(std::ceil(std::log(1.0 - kConfidence) / std::log(1.0 - good))));
+}
+
+struct Candidate {
+  Transfer motion;
+  Flags flags;
+  std::size_t inliers = 0;
+};
+
+// Draws samples, lets `solve` turn each into a motion, keeps the one with most inliers.
+template <std::size_t n, class Solve>
+void search(const Problem& problem, const std::vector<std::size_t>& from, std::mt19937& random, Solve&& solve,
+            Candidate& best) {
+  int trials = kMaxTrials;
+  for (int trial = 0; trial < trials; ++trial) {
+    const std::optional<Transfer> motion = solve(draw<n>(from, random));
+    if (!motion) continue;
+    Flags flags = problem.classify(*motion);
+    const std::size_t inliers = count(flags);
+    if (inliers <= best.inliers) continue;
+    best = {*motion, std::move(flags), inliers};
+    trials = std::min(trials, trials_needed(inliers, problem.flows.size(), n));
+  }
+}
+
+// Neither depth nor rotation: the essential matrix, by OpenCV. A static or purely turning camera fits it as well.
+Flags essential_inliers(const std::vector<Flow>& flows, double tolerance) {
+  std::vector<cv::Point2d> from;
+  std::vector<cv::Point2d> to;
+  for (const Flow& flow : flows) {
+    from.emplace_back(flow.x0.x(), flow.x0.y());
+    to.emplace_back(flow.x1.x(), flow.x1.y());
+  }
+  std::vector<std::uint8_t> mask;
+  cv::findEssentialMat(from, to, cv::Mat::eye(3, 3, CV_64F), cv::RANSAC, kConfidence, tolerance, mask);
+  return mask.size() == flows.size() ? mask : Flags(flows.size(), 1);
+}
+
+}  // namespace
+
+Flags FlowCheck::inliers(const std::vector<Flow>& flows, const MotionGuess& guess) {
+  if (flows.size() < kMinFlows) return Flags(flows.size(), 1);
+  std::vector<std::size_t> with_depth;
+  for (std::size_t i = 0; i < flows.size(); ++i) {
+    if (flows[i].has_depth) with_depth.push_back(i);
+  }
+  const bool metric = with_depth.size() >= kMinDepths;
+  if (!metric && !guess.rotation_known) return essential_inliers(flows, tolerance_);
+
+  Problem problem{flows, tolerance_};
+  Candidate best;
+  best.motion = guess.motion;
+  if (!guess.translation_known) best.motion.p_10.setZero();
+  best.flags = problem.classify(best.motion);
+  best.inliers = count(best.flags);
+  const bool search_needed = static_cast<double>(best.inliers) < kGoodGuess * static_cast<double>(flows.size());
+
+  if (!metric) {
+    if (!search_needed) return best.flags;
+    problem.depth_sigma_unknown = 1e3;  // the translation has unit length: depths have no unit
+    std::vector<std::size_t> all(flows.size());
+    std::iota(all.begin(), all.end(), std::size_t{0});
+    search<2>(problem, all, random_, [&](const std::array<std::size_t, 2>& s) -> std::optional<Transfer> {
+      const auto p = solve_direction(flows, s[0], s[1], guess.motion.R_10);
+      if (!p) return std::nullopt;
+      return Transfer{guess.motion.R_10, *p};
+    }, best);
+    return best.flags;
+  }
+
+  if (search_needed && guess.rotation_known) {
+    search<2>(problem, with_depth, random_, [&](const std::array<std::size_t, 2>& s) -> std::optional<Transfer> {
+      const auto p = solve_translation(flows, s[0], s[1], guess.motion.R_10);
+      if (!p) return std::nullopt;
+      return Transfer{guess.motion.R_10, *p};
+    }, best);
+  } else if (search_needed) {
+    search<3>(problem, with_depth, random_, [&](const std::array<std::size_t, 3>& s) -> std::optional<Transfer> {
+      Flags used(flows.size(), 0);
+      for (const std::size_t i : s) used[i] = 1;
+      return refine(flows, used, guess.motion, 5);
+    }, best);
+  }
+  // Gyroscope and prediction are not perfect: let the inliers correct them, then decide.
+  const std::optional<Transfer> refined = refine(flows, best.flags, best.motion, kRefinements);
+  if (!refined) return best.flags;
+  Flags flags = problem.classify(*refined);
+  return count(flags) >= best.inliers ? flags : best.flags;
+}
+
+}  // namespace ear

@@ -1,0 +1,44 @@
+// Which features moved as a static scene must, seen from a camera that moved rigidly: a sample consensus over the
+// camera's motion, refined by Gauss-Newton.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <random>
+#include <vector>
+
+#include "frontend/stereo_geometry.h"
+
+namespace ear {
+
+/// One feature in two frames of one camera, normalized coordinates.
+struct Flow {
+  Eigen::Vector2d x0 = Eigen::Vector2d::Zero();
+  Eigen::Vector2d x1 = Eigen::Vector2d::Zero();
+  double inverse_depth0 = 0.0;        ///< [1/m], used if has_depth
+  double inverse_depth_sigma = 0.0;   ///< [1/m]
+  bool has_depth = false;
+};
+
+/// What is known of the camera's motion beforehand. Transfer: from the first frame to the second.
+struct MotionGuess {
+  Transfer motion;
+  bool rotation_known = false;
+  bool translation_known = false;
+};
+
+class FlowCheck {
+ public:
+  /// `tolerance`: distance in normalized coordinates at which a feature stops being static.
+  explicit FlowCheck(double tolerance) : tolerance_(tolerance) {}
+
+  /// One flag for each flow: 1 if it belongs to the static scene. With too few flows to tell, all are kept.
+  [[nodiscard]] std::vector<std::uint8_t> inliers(const std::vector<Flow>& flows, const MotionGuess& guess);
+
+ private:
+  double tolerance_;
+  std::mt19937 random_{20240607};  // fixed seed: the same images give the same features
+};
+
+}  // namespace ear

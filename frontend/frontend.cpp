@@ -1,0 +1,334 @@
+#include "frontend/frontend.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+#include "frontend/detector.h"
+#include "frontend/flow_check.h"
+#include "frontend/image_pyramid.h"
+#include "frontend/image_quality.h"
+#include "frontend/lens.h"
+#include "frontend/reference_patch.h"
+#include "frontend/stereo_matcher.h"
+
+namespace ear {
+namespace {
+
+constexpr float kEdge_px = 8.0F;                // features closer to the image's edge are dropped
+constexpr float kMinTrackDistance_px = 5.0F;    // two tracks closer than this have become one
+constexpr double kFlowTolerance_px = 2.0;
+constexpr double kDisparitySigma_px = 1.0;      // for the depth's part of that tolerance
+constexpr double kMapStep_px = 4.0;             // of the finite differences of a predicted affine map
+constexpr int kLevelPredicted = 1;              // where to begin with the full motion and the depth,
+constexpr int kLevelRotation = 2;               // with the rotation only,
+constexpr int kLevelUnknown = ImagePyramid::kMaxLevels - 1;  // and without either
+constexpr float kRefreshCorrelation = 0.85F;    // below, the feature is given a new reference patch
+constexpr float kRefreshStretch = 1.6F;         // and beyond this change of scale
+
+struct Track {
+  std::uint64_t id = 0;
+  int age = 0;                 // frames since detection
+  std::size_t patch = 0;       // index into the store
+  Warp left;                   // of the reference patch
+  Eigen::Vector2d left_ray = Eigen::Vector2d::Zero();
+  bool has_depth = false;      // known from this or an earlier frame
+  double inverse_depth = 0.0;  // 1/z in the left camera of this frame
+  Eigen::Matrix2f right_from_left = Eigen::Matrix2f::Identity();
+  bool has_right = false;      // seen by the right camera in this frame
+  Eigen::Vector2d right_ray = Eigen::Vector2d::Zero();
+};
+
+// Seconds since the last call.
+class Stopwatch {
+ public:
+  double lap() {
+    const auto now = std::chrono::steady_clock::now();
+    const double seconds = std::chrono::duration<double>(now - last_).count();
+    last_ = now;
+    return seconds;
+  }
+
+ private:
+  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+};
+
+void check_size(const ImageView& image, const CameraCalibration& camera, const char* name) {
+  if (image.width == camera.width && image.height == camera.height) return;
+  throw std::invalid_argument(std::string(name) + " image is " + std::to_string(image.width) + "x" +
+                              std::to_string(image.height) + ", its calibration says " + std::to_string(camera.width) +
+                              "x" + std::to_string(camera.height));
+}
+
+const CameraCalibration& first_of(const std::vector<CameraCalibration>& cameras) {
+  if (cameras.empty()) throw std::invalid_argument("the front end needs at least one camera");
+  return cameras.front();
+}
+
+}  // namespace
+
+class Frontend::Impl {
+ public:
+  Impl(const FrontendConfig& config, std::vector<CameraCalibration> cameras);
+
+  const FeatureFrame& process(const StereoFrame& frame, const MotionPrediction& prediction);
+  void reset();
+
+  ImageQuality quality;
+  FrontendTiming timing;
+
+ private:
+  void track(const MotionPrediction& prediction);
+  bool track_one(Track& track, const Transfer& motion, const MotionPrediction& prediction);
+  void reject(const MotionPrediction& prediction);
+  void match_stereo();
+  void match_stereo(Track& track, bool followed);
+  void detect();
+  void refresh_patches();
+  void drop(const std::vector<std::uint8_t>& keep);
+  [[nodiscard]] Transfer camera_motion(const MotionPrediction& prediction) const;
+  [[nodiscard]] std::vector<Eigen::Vector2f> pixels() const;
+  void write_output(TimeNs t_ns);
+
+  FrontendConfig config_;
+  std::vector<CameraCalibration> cameras_;
+  Lens lens_;
+  std::optional<StereoMatcher> stereo_;
+  Detector detector_;
+  FlowCheck flow_check_;
+
+  ImagePyramid left_;
+  ImagePyramid right_;
+  bool right_present_ = false;
+  std::vector<Track> tracks_;
+  std::vector<Track> previous_;  // the same tracks, index by index, before this frame
+  std::vector<ReferencePatch> patches_;
+  std::vector<std::size_t> free_patches_;
+  std::uint64_t next_id_ = 0;
+  FeatureFrame output_;
+};
+
+Frontend::Impl::Impl(const FrontendConfig& config, std::vector<CameraCalibration> cameras)
+    : config_(config),
+      cameras_(std::move(cameras)),
+      lens_(first_of(cameras_)),
+      detector_(cameras_.front().width, cameras_.front().height, std::max(config.max_features, 1)),
+      flow_check_(kFlowTolerance_px / lens_.focal_px()) {
+  if (config_.max_features < 1) throw std::invalid_argument("frontend: max_features must be positive");
+  if (!(config_.nearest_depth > 0.0)) throw std::invalid_argument("frontend: nearest_depth must be positive");
+  if (cameras_.size() > 1) stereo_.emplace(cameras_[0], cameras_[1], config_.nearest_depth);
+  patches_.resize(static_cast<std::size_t>(config_.max_features));
+  reset();
+}
+
+void Frontend::Impl::reset() {
+  tracks_.clear();
+  free_patches_.clear();
+  for (std::size_t i = 0; i < patches_.size(); ++i) free_patches_.push_back(i);
+}
+
+const FeatureFrame& Frontend::Impl::process(const StereoFrame& frame, const MotionPrediction& prediction) {
+  check_size(frame.left, cameras_.front(), "left");
+  right_present_ = stereo_ && !frame.right.empty();
+  if (right_present_) check_size(frame.right, cameras_[1], "right");
+
+  Stopwatch watch;
+  left_.build(frame.left);
+  if (right_present_) right_.build(frame.right);
+  quality = measure_quality(left_.level(0));
+  timing.pyramid = watch.lap();
+  track(prediction);
+  timing.track = watch.lap();
+  reject(prediction);
+  timing.reject = watch.lap();
+  quality.tracked = static_cast<int>(tracks_.size());
+  match_stereo();
+  timing.stereo = watch.lap();
+  refresh_patches();
+  detect();
+  timing.detect = watch.lap();
+
+  write_output(frame.t_ns);
+  return output_;
+}
+
+Transfer Frontend::Impl::camera_motion(const MotionPrediction& prediction) const {
+  Eigen::Isometry3d T_B1B0 = Eigen::Isometry3d::Identity();
+  if (prediction.rotation_known) T_B1B0.linear() = prediction.R_B1B0;
+  if (prediction.rotation_known && prediction.translation_known) {
+    T_B1B0.translation() = -(prediction.R_B1B0 * prediction.p_B0B1);
+  }
+  const Eigen::Isometry3d& T_BC = cameras_.front().T_BC;
+  const Eigen::Isometry3d T_C1C0 = T_BC.inverse() * T_B1B0 * T_BC;
+  return {T_C1C0.linear(), T_C1C0.translation()};
+}
+
+void Frontend::Impl::track(const MotionPrediction& prediction) {
+  const Transfer motion = camera_motion(prediction);
+  previous_ = tracks_;
+  std::vector<std::uint8_t> keep(tracks_.size());
+  for (std::size_t i = 0; i < tracks_.size(); ++i) keep[i] = track_one(tracks_[i], motion, prediction);
+  // Of two tracks that have run into each other, the younger goes. Older ones come first.
+  for (std::size_t i = 0; i < tracks_.size(); ++i) {
+    for (std::size_t j = 0; j < i && keep[i]; ++j) {
+      const Eigen::Vector2f apart = tracks_[i].left.centre - tracks_[j].left.centre;
+      if (keep[j] && apart.squaredNorm() < kMinTrackDistance_px * kMinTrackDistance_px) keep[i] = 0;
+    }
+  }
+  drop(keep);
+}
+
+bool Frontend::Impl::track_one(Track& track, const Transfer& motion, const MotionPrediction& prediction) {
+  const double inverse_depth = track.has_depth ? track.inverse_depth : 0.0;
+  const auto move = [&](const Eigen::Vector2d& ray) -> std::optional<Eigen::Vector2d> {
+    const Eigen::Vector3d point = motion.scaled_point(ray, inverse_depth);
+    if (!(point.z() > 1e-3)) return std::nullopt;
+    return lens_.to_pixel(point.hnormalized());
+  };
+  const auto centre = move(track.left_ray);
+  if (!centre) return false;
+  Warp start{centre->cast<float>(), track.left.affine};
+  const Eigen::Vector2d pixel = track.left.centre.cast<double>();
+  const auto ray_right = lens_.to_normalized(pixel + Eigen::Vector2d(kMapStep_px, 0.0));
+  const auto ray_below = lens_.to_normalized(pixel + Eigen::Vector2d(0.0, kMapStep_px));
+  const auto right = ray_right ? move(*ray_right) : std::nullopt;
+  const auto below = ray_below ? move(*ray_below) : std::nullopt;
+  if (right && below) {
+    Eigen::Matrix2d change;
+    change << (*right - *centre) / kMapStep_px, (*below - *centre) / kMapStep_px;
+    start.affine = change.cast<float>() * track.left.affine;
+  }
+
+  const bool full = prediction.rotation_known && prediction.translation_known && track.has_depth;
+  const int level = full ? kLevelPredicted : prediction.rotation_known ? kLevelRotation : kLevelUnknown;
+  const ReferencePatch& patch = patches_[track.patch];
+  auto match = patch.align(left_, start, level);
+  if (!match && level < kLevelUnknown) match = patch.align(left_, start, kLevelUnknown);
+  if (!match) return false;
+
+  const Eigen::Vector2f& found = match->warp.centre;
+  const GreyLevel& image = left_.level(0);
+  const auto in = [](float value, int size) { return value >= kEdge_px && value <= static_cast<float>(size - 1) - kEdge_px; };
+  if (!in(found.x(), image.width) || !in(found.y(), image.height)) return false;
+  const auto ray = lens_.to_normalized(found.cast<double>());
+  if (!ray) return false;
+  track.inverse_depth = inverse_depth / motion.scaled_point(track.left_ray, inverse_depth).z();
+  track.left = match->warp;
+  track.left_ray = *ray;
+  track.has_right = false;
+  ++track.age;
+  return true;
+}
+
+void Frontend::Impl::reject(const MotionPrediction& prediction) {
+  const double sigma = stereo_ ? kDisparitySigma_px * stereo_->inverse_depth_per_pixel() : 0.0;
+  std::vector<Flow> flows;
+  flows.reserve(tracks_.size());
+  for (std::size_t i = 0; i < tracks_.size(); ++i) {
+    const Track& before = previous_[i];
+    flows.push_back({before.left_ray, tracks_[i].left_ray, before.inverse_depth, sigma, before.has_depth});
+  }
+  drop(flow_check_.inliers(flows, {camera_motion(prediction), prediction.rotation_known,
+                                   prediction.rotation_known && prediction.translation_known}));
+}
+
+void Frontend::Impl::match_stereo() {
+  if (!right_present_) return;
+  for (Track& track : tracks_) match_stereo(track, track.has_depth);
+}
+
+void Frontend::Impl::match_stereo(Track& track, bool followed) {
+  const ReferencePatch& patch = patches_[track.patch];
+  std::optional<StereoMatch> match;
+  if (followed) {
+    match = stereo_->follow(right_, patch, track.left, track.left_ray, track.inverse_depth, track.right_from_left);
+  }
+  if (!match) match = stereo_->search(right_, patch, track.left, track.left_ray);
+  track.has_right = match.has_value();
+  if (!match) return;
+  track.has_depth = true;
+  track.inverse_depth = match->inverse_depth;
+  track.right_ray = match->right;
+  track.right_from_left = match->right_from_left;
+}
+
+void Frontend::Impl::refresh_patches() {
+  for (Track& track : tracks_) {
+    const float area = track.left.affine.determinant();
+    const bool stretched = area > kRefreshStretch * kRefreshStretch || area * kRefreshStretch * kRefreshStretch < 1.0F;
+    if (!stretched) continue;
+    if (patches_[track.patch].capture(left_, track.left.centre)) track.left.affine.setIdentity();
+  }
+}
+
+void Frontend::Impl::detect() {
+  const int wanted = config_.max_features - static_cast<int>(tracks_.size());
+  const std::vector<Corner> corners = detector_.detect(left_, pixels(), wanted);
+  quality.detected = 0;
+  for (const Corner& corner : corners) {
+    const auto ray = lens_.to_normalized(corner.pixel.cast<double>());
+    if (!ray) continue;
+    Track track;
+    track.patch = free_patches_.back();
+    if (!patches_[track.patch].capture(left_, corner.pixel)) continue;
+    free_patches_.pop_back();
+    track.id = next_id_++;
+    track.left.centre = corner.pixel;
+    track.left_ray = *ray;
+    if (right_present_) match_stereo(track, false);
+    tracks_.push_back(track);
+    ++quality.detected;
+  }
+}
+
+void Frontend::Impl::drop(const std::vector<std::uint8_t>& keep) {
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < tracks_.size(); ++i) {
+    if (!keep[i]) {
+      free_patches_.push_back(tracks_[i].patch);
+      continue;
+    }
+    tracks_[kept] = tracks_[i];
+    previous_[kept] = previous_[i];
+    ++kept;
+  }
+  tracks_.resize(kept);
+  previous_.resize(kept);
+}
+
+std::vector<Eigen::Vector2f> Frontend::Impl::pixels() const {
+  std::vector<Eigen::Vector2f> all;
+  all.reserve(tracks_.size());
+  for (const Track& track : tracks_) all.push_back(track.left.centre);
+  return all;
+}
+
+void Frontend::Impl::write_output(TimeNs t_ns) {
+  output_.t_ns = t_ns;
+  output_.features.clear();
+  quality.stereo = 0;
+  for (const Track& track : tracks_) {
+    output_.features.push_back({track.id, track.left_ray, track.right_ray, track.has_right});
+    quality.stereo += track.has_right ? 1 : 0;
+  }
+  quality.coverage = detector_.coverage(pixels());
+}
+
+Frontend::Frontend(const FrontendConfig& config, std::vector<CameraCalibration> cameras)
+    : impl_(std::make_unique<Impl>(config, std::move(cameras))) {}
+Frontend::~Frontend() = default;
+Frontend::Frontend(Frontend&&) noexcept = default;
+Frontend& Frontend::operator=(Frontend&&) noexcept = default;
+
+const FeatureFrame& Frontend::process(const StereoFrame& frame, const MotionPrediction& prediction) {
+  return impl_->process(frame, prediction);
+}
+const ImageQuality& Frontend::quality() const { return impl_->quality; }
+const FrontendTiming& Frontend::timing() const { return impl_->timing; }
+void Frontend::reset() { impl_->reset(); }
+
+}  // namespace ear

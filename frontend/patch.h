@@ -1,0 +1,69 @@
+// The appearance of a feature, and its alignment with an image: inverse-compositional Lucas-Kanade under an affine warp
+// (Baker and Matthews 2004), blind to gain and offset of the brightness.
+//
+// All gradients belong to the stored patch, so that an iteration only samples the image and adds up products.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <optional>
+
+#include "frontend/image_pyramid.h"
+
+namespace ear {
+
+/// Where a patch lies in an image: the pixel of its centre, and the affine map from patch to image around it.
+struct Warp {
+  Eigen::Vector2f centre = Eigen::Vector2f::Zero();         ///< [px]
+  Eigen::Matrix2f affine = Eigen::Matrix2f::Identity();     ///< patch offset to image offset
+};
+
+/// A patch at one level of a pyramid. Offsets of its pixels from the centre are -7.5, -6.5, ... 7.5.
+class PatchLevel {
+ public:
+  static constexpr int kSize = 16;
+  static constexpr float kHalf = 0.5F * (kSize - 1);
+
+  /// Takes the patch around `centre` [px of this level]. False if it reaches outside the level's border or has no
+  /// texture in one direction; the patch is then unusable.
+  bool capture(const GreyLevel& level, const Eigen::Vector2f& centre);
+
+  /// Smaller eigenvalue of the patch's structure matrix [grey^2]: the variance of the image noise divided by it is the
+  /// variance of the patch's position along the direction that it sees worst [px^2].
+  [[nodiscard]] float corner_strength() const { return corner_strength_; }
+
+  struct Step {
+    float correlation = -1.0F;  ///< zero-mean normalized correlation *before* the step, -1 to 1
+    float moved = 0.0F;         ///< [px of this level]
+  };
+
+  /// One Gauss-Newton step of the position; nothing if the patch leaves the image or does not correlate with it.
+  [[nodiscard]] std::optional<Step> step_position(const GreyLevel& level, Warp& warp) const;
+
+  /// One Gauss-Newton step of position and affine map. The map is held near `prior`, so that a patch which does
+  /// not show some direction of it (an edge) keeps what is known.
+  [[nodiscard]] std::optional<Step> step_affine(const GreyLevel& level, const Eigen::Matrix2f& prior, Warp& warp) const;
+
+  /// Zero-mean normalized correlation of the patch with the image; nothing if it leaves the image.
+  [[nodiscard]] std::optional<float> correlate(const GreyLevel& level, const Warp& warp) const;
+
+ private:
+  static constexpr int kPixels = kSize * kSize;
+  using Pixels = std::array<float, kPixels>;
+  using Vector6f = Eigen::Matrix<float, 6, 1>;
+  using Matrix6f = Eigen::Matrix<float, 6, 6>;
+
+  // Order of the parameters: position x, y; affine xx, xy, yx, yy.
+  alignas(16) Pixels value_;  // mean removed
+  alignas(16) Pixels gradient_x_;
+  alignas(16) Pixels gradient_y_;
+  float mean_ = 0.0F;
+  float energy_ = 0.0F;   // sum of value^2
+  float corner_strength_ = 0.0F;
+  Vector6f J_sum_;        // J^T 1
+  Vector6f J_value_;      // J^T value
+  Eigen::Matrix2f covariance_position_;
+  Matrix6f covariance_affine_;
+};
+
+}  // namespace ear

@@ -1,0 +1,125 @@
+#include "frontend/stereo_matcher.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <vector>
+
+namespace ear {
+namespace {
+
+constexpr int kSearchLevel = 2;
+constexpr double kSearchStep_px = 4.0;       // on the base image: one pixel of the search level
+constexpr double kMaxDisparityShare = 0.2;   // of the image's width
+constexpr float kMinSearchCorrelation = 0.5F;  // on the search level
+constexpr float kRivalMargin = 0.1F;           // a second peak this close to the first is looked at as well
+constexpr float kAmbiguous = 0.03F;            // two places that differ less are not told apart
+constexpr double kMaxEpipolar_px = 1.0;
+constexpr double kMinDisparity_px = -0.7;      // noise of a point at infinity
+constexpr double kMaxDepthJump_px = 1.5;       // disparity against what was carried over, plus
+constexpr double kMaxDepthJumpShare = 0.1;     // this share of the disparity
+constexpr double kMapStep_px = 4.0;            // of the finite differences of an affine map
+
+}  // namespace
+
+StereoMatcher::StereoMatcher(const CameraCalibration& left, const CameraCalibration& right, double nearest_depth)
+    : left_lens_(left), right_lens_(right) {
+  const Eigen::Isometry3d T_C1C0 = right.T_BC.inverse() * left.T_BC;
+  right_from_left_ = {T_C1C0.linear(), T_C1C0.translation()};
+  const double baseline = T_C1C0.translation().norm();
+  if (!(baseline > 1e-4)) throw std::invalid_argument("cameras: the two cameras of the stereo pair are at the same place");
+  inverse_depth_per_pixel_ = 1.0 / (baseline * right_lens_.focal_px());
+  max_inverse_depth_ =
+      std::min(1.0 / nearest_depth, kMaxDisparityShare * static_cast<double>(right.width) * inverse_depth_per_pixel_);
+}
+
+std::optional<Eigen::Vector2d> StereoMatcher::project(const Eigen::Vector2d& left, double inverse_depth) const {
+  const Eigen::Vector3d point = right_from_left_.scaled_point(left, inverse_depth);
+  if (!(point.z() > 1e-3)) return std::nullopt;
+  return right_lens_.to_pixel(point.hnormalized());
+}
+
+Eigen::Matrix2f StereoMatcher::predicted_map(const Eigen::Vector2d& left_pixel, double inverse_depth) const {
+  const auto map = [&](const Eigen::Vector2d& pixel) -> std::optional<Eigen::Vector2d> {
+    const auto ray = left_lens_.to_normalized(pixel);
+    return ray ? project(*ray, inverse_depth) : std::nullopt;
+  };
+  const auto centre = map(left_pixel);
+  const auto right = map(left_pixel + Eigen::Vector2d(kMapStep_px, 0.0));
+  const auto below = map(left_pixel + Eigen::Vector2d(0.0, kMapStep_px));
+  if (!centre || !right || !below) return Eigen::Matrix2f::Identity();
+  Eigen::Matrix2d affine;
+  affine << (*right - *centre) / kMapStep_px, (*below - *centre) / kMapStep_px;
+  return affine.cast<float>();
+}
+
+std::optional<StereoMatch> StereoMatcher::accept(const ReferencePatch::Match& match, const Warp& left_warp,
+                                                 const Eigen::Vector2d& left) const {
+  const auto right = right_lens_.to_normalized(match.warp.centre.cast<double>());
+  if (!right) return std::nullopt;
+  const auto point = intersect(right_from_left_, left, *right);
+  if (!point) return std::nullopt;
+  if (point->epipolar_distance * right_lens_.focal_px() > kMaxEpipolar_px) return std::nullopt;
+  if (point->inverse_depth < kMinDisparity_px * inverse_depth_per_pixel_) return std::nullopt;
+  return StereoMatch{*right, std::max(point->inverse_depth, 0.0), match.warp.affine * left_warp.affine.inverse()};
+}
+
+std::optional<StereoMatch> StereoMatcher::follow(const ImagePyramid& right, const ReferencePatch& patch,
+                                                 const Warp& left_warp, const Eigen::Vector2d& left,
+                                                 double inverse_depth, const Eigen::Matrix2f& right_from_left) const {
+  const auto pixel = project(left, inverse_depth);
+  if (!pixel) return std::nullopt;
+  const auto match = patch.align(right, {pixel->cast<float>(), right_from_left * left_warp.affine}, 0);
+  if (!match) return std::nullopt;
+  const auto accepted = accept(*match, left_warp, left);
+  if (!accepted) return std::nullopt;
+  const double jump = std::abs(accepted->inverse_depth - inverse_depth);
+  if (jump > kMaxDepthJump_px * inverse_depth_per_pixel_ + kMaxDepthJumpShare * inverse_depth) return std::nullopt;
+  return accepted;
+}
+
+std::optional<StereoMatch> StereoMatcher::search(const ImagePyramid& right, const ReferencePatch& patch,
+                                                 const Warp& left_warp, const Eigen::Vector2d& left) const {
+  // The maps between the images hardly depend on depth; take it halfway.
+  const Eigen::Matrix2f map = predicted_map(left_warp.centre.cast<double>(), 0.25 * max_inverse_depth_);
+  const Eigen::Matrix2f affine = map * left_warp.affine;
+  const int level = std::min(kSearchLevel, right.top_level());
+
+  std::vector<Hypothesis> line;
+  const double step = kSearchStep_px * inverse_depth_per_pixel_;
+  for (double inverse_depth = 0.0; inverse_depth <= max_inverse_depth_; inverse_depth += step) {
+    const auto pixel = project(left, inverse_depth);
+    if (!pixel) continue;
+    const auto correlation = patch.correlate(right, {pixel->cast<float>(), affine}, level);
+    if (correlation) line.push_back({inverse_depth, *pixel, *correlation});
+  }
+  std::vector<Hypothesis> peaks;
+  for (std::size_t i = 0; i < line.size(); ++i) {
+    const bool over_last = i == 0 || line[i].correlation >= line[i - 1].correlation;
+    const bool over_next = i + 1 == line.size() || line[i].correlation > line[i + 1].correlation;
+    if (over_last && over_next && line[i].correlation > kMinSearchCorrelation) peaks.push_back(line[i]);
+  }
+  const std::size_t kept = std::min<std::size_t>(peaks.size(), 2);
+  std::partial_sort(peaks.begin(), peaks.begin() + static_cast<std::ptrdiff_t>(kept), peaks.end(),
+                    [](const Hypothesis& a, const Hypothesis& b) { return a.correlation > b.correlation; });
+  peaks.resize(kept);
+  if (kept == 2 && peaks[1].correlation < peaks[0].correlation - kRivalMargin) peaks.pop_back();
+
+  std::optional<ReferencePatch::Match> best;
+  for (const Hypothesis& peak : peaks) {
+    const auto match = patch.align(right, {peak.pixel.cast<float>(), affine}, level);
+    if (!match) continue;
+    if (!best) {
+      best = match;
+      continue;
+    }
+    if ((match->warp.centre - best->warp.centre).norm() < 2.0F) continue;  // both led to the same place
+    if (std::abs(match->correlation - best->correlation) < kAmbiguous) return std::nullopt;
+    if (match->correlation > best->correlation) best = match;
+  }
+  if (!best) return std::nullopt;
+  return accept(*best, left_warp, left);
+}
+
+}  // namespace ear
