@@ -1,0 +1,82 @@
+// ear evaluate ESTIMATE... TRUTH [--align se3|yaw|none] [--json] [--report FILE]: how good trajectories are.
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <map>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tools/commands.h"
+#include "tools/evaluation/evaluate.h"
+#include "tools/evaluation/read.h"
+#include "tools/evaluation/report.h"
+#include "tools/evaluation/summary.h"
+
+namespace ear::tools {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct EvaluateArguments {
+  std::vector<fs::path> paths;  ///< estimates, then the truth
+  evaluation::AlignmentKind kind = evaluation::AlignmentKind::yaw;
+  bool json = false;
+  fs::path report;
+};
+
+void write_report(const fs::path& path, const std::string& title, const evaluation::Trajectory& truth,
+                  const std::vector<evaluation::ReportEntry>& entries) {
+  std::ofstream file(path);
+  file << evaluation::to_html(title, truth, entries) << std::flush;
+  if (!file) throw std::runtime_error(path.string() + ": cannot be written");
+}
+
+void evaluate(const EvaluateArguments& arguments) {
+  const fs::path truth_path = arguments.paths.back();
+  const std::vector<fs::path> estimate_paths(arguments.paths.begin(), arguments.paths.end() - 1);
+  const std::vector<std::string> names = evaluation::distinct_names(estimate_paths);
+  const evaluation::Trajectory truth = evaluation::read_truth(truth_path);
+
+  std::vector<evaluation::ReportEntry> entries;
+  std::vector<evaluation::Evaluation> evaluations;
+  for (std::size_t i = 0; i < estimate_paths.size(); ++i) {
+    evaluation::Estimate estimate = evaluation::read_estimate(estimate_paths[i]);
+    estimate.name = names[i];
+    evaluations.push_back(evaluation::evaluate(estimate, truth, arguments.kind));
+    entries.push_back({std::move(estimate), evaluations.back()});
+  }
+  if (!arguments.report.empty())
+    write_report(arguments.report, evaluation::distinct_names({truth_path}).front(), truth, entries);
+  std::cout << (arguments.json ? evaluation::to_json(evaluations, truth_path.string())
+                               : evaluation::to_table(evaluations));
+}
+
+}  // namespace
+
+void add_evaluate_command(CLI::App& app) {
+  using evaluation::AlignmentKind;
+  const std::map<std::string, AlignmentKind> kinds{
+      {"se3", AlignmentKind::se3}, {"yaw", AlignmentKind::yaw}, {"none", AlignmentKind::none}};
+
+  const auto arguments = std::make_shared<EvaluateArguments>();
+  CLI::App* const command = app.add_subcommand("evaluate", "how far estimated trajectories are from the truth");
+  command
+      ->add_option("paths", arguments->paths,
+                   "ESTIMATE... TRUTH: output folders of ear run, states.csv, TUM or EuRoC csv files; then the "
+                   "recording, EuRoC csv or TUM file with the truth")
+      ->required()
+      ->expected(2, 1000)
+      ->type_name("ESTIMATE... TRUTH");
+  command->add_option("--align", arguments->kind, "what the worlds may differ in: se3, yaw (and translation), none")
+      ->transform(CLI::CheckedTransformer(kinds, CLI::ignore_case))
+      ->type_name("se3|yaw|none")
+      ->default_str("yaw");
+  command->add_flag("--json", arguments->json, "the figures as JSON instead of a table");
+  command->add_option("--report", arguments->report, "also write a page with plots")->type_name("FILE.html");
+  command->callback([arguments] { evaluate(*arguments); });
+}
+
+}  // namespace ear::tools

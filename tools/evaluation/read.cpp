@@ -1,0 +1,172 @@
+#include "tools/evaluation/read.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <optional>
+#include <set>
+#include <stdexcept>
+
+#include "tools/evaluation/text_table.h"
+
+namespace ear::evaluation {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kQuaternionTolerance = 0.01;  // rounding to three digits passes, a shifted column does not
+
+/// Where a pose stands in a row, with the names that errors use.
+struct PoseColumns {
+  std::size_t time = 0;
+  int time_exponent = 0;  // 0: nanoseconds, 9: seconds
+  std::array<std::size_t, 3> p{};
+  std::array<std::size_t, 4> q_wxyz{};
+};
+
+constexpr PoseColumns kEurocColumns{0, 0, {1, 2, 3}, {4, 5, 6, 7}};
+constexpr PoseColumns kTumColumns{0, 9, {1, 2, 3}, {7, 4, 5, 6}};
+constexpr std::array<const char*, 3> kPositionNames{"p_x", "p_y", "p_z"};
+constexpr std::array<const char*, 4> kQuaternionNames{"q_w", "q_x", "q_y", "q_z"};
+constexpr std::array<const char*, 6> kErrorNames{"x", "y", "z", "rx", "ry", "rz"};
+
+std::size_t required_column(const TextTable& table, const std::string& name) {
+  const std::optional<std::size_t> column = table.column(name);
+  if (!column) table.fail("the header has no column '" + name + "'");
+  return *column;
+}
+
+PoseColumns named_columns(const TextTable& table) {
+  PoseColumns columns;
+  columns.time = required_column(table, "t_ns");
+  for (std::size_t i = 0; i < 3; ++i) columns.p[i] = required_column(table, kPositionNames[i]);
+  for (std::size_t i = 0; i < 4; ++i) columns.q_wxyz[i] = required_column(table, kQuaternionNames[i]);
+  return columns;
+}
+
+PoseColumns pose_columns(const TextTable& table) {
+  if (table.column("t_ns")) return named_columns(table);
+  if (table.columns() < 8)
+    table.fail("neither TUM (8 columns), nor EuRoC csv (8 or more), nor a csv with a column 't_ns' in its header");
+  return table.has_commas() ? kEurocColumns : kTumColumns;
+}
+
+Pose read_pose(const TextTable& table, const Row& row, const PoseColumns& columns) {
+  Pose pose;
+  pose.t_ns = table.time(row, columns.time, "time", columns.time_exponent);
+  for (std::size_t i = 0; i < 3; ++i)
+    pose.p_WB(static_cast<Eigen::Index>(i)) = table.number(row, columns.p[i], kPositionNames[i]);
+  std::array<double, 4> q{};
+  for (std::size_t i = 0; i < 4; ++i) q[i] = table.number(row, columns.q_wxyz[i], kQuaternionNames[i]);
+  pose.q_WB = Eigen::Quaterniond(q[0], q[1], q[2], q[3]);
+  const double norm = pose.q_WB.norm();
+  if (std::abs(norm - 1.0) > kQuaternionTolerance)
+    table.fail(row, columns.q_wxyz[0], kQuaternionNames[0], "quaternion of length " + std::to_string(norm));
+  pose.q_WB.normalize();
+  return pose;
+}
+
+Trajectory read_poses(const TextTable& table) {
+  const PoseColumns columns = pose_columns(table);
+  Trajectory poses;
+  poses.reserve(table.rows().size());
+  for (const Row& row : table.rows()) {
+    const Pose pose = read_pose(table, row, columns);
+    if (!poses.empty() && pose.t_ns <= poses.back().t_ns)
+      table.fail(row, columns.time, "time", "not later than the line before");
+    poses.push_back(pose);
+  }
+  return poses;
+}
+
+std::string covariance_name(std::size_t i, std::size_t j) {
+  return std::string("cov_") + kErrorNames[i] + "_" + kErrorNames[j];
+}
+
+/// One covariance per row, or nothing if the file has no such columns. All 21 of the upper triangle must be there.
+std::vector<PoseCovariance> read_covariances(const TextTable& table) {
+  if (!table.column(covariance_name(0, 0))) return {};
+  std::vector<PoseCovariance> covariances(table.rows().size());
+  for (std::size_t i = 0; i < 6; ++i) {
+    for (std::size_t j = i; j < 6; ++j) {
+      const std::string name = covariance_name(i, j);
+      const std::size_t column = required_column(table, name);
+      const auto a = static_cast<Eigen::Index>(i);
+      const auto b = static_cast<Eigen::Index>(j);
+      for (std::size_t k = 0; k < covariances.size(); ++k)
+        covariances[k](a, b) = covariances[k](b, a) = table.number(table.rows()[k], column, name);
+    }
+  }
+  return covariances;
+}
+
+std::vector<std::string> read_labels(const TextTable& table, const std::string& name) {
+  const std::optional<std::size_t> column = table.column(name);
+  if (!column) return {};
+  std::vector<std::string> labels;
+  for (const Row& row : table.rows()) labels.push_back(row.fields[*column]);
+  return labels;
+}
+
+/// The file of an estimate or truth given by its folder; a file is itself.
+fs::path file_in(const fs::path& path, const std::vector<fs::path>& candidates) {
+  if (!fs::exists(path)) throw std::runtime_error(path.string() + ": does not exist");
+  if (!fs::is_directory(path)) return path;
+  for (const fs::path& candidate : candidates)
+    if (fs::exists(path / candidate)) return path / candidate;
+  std::string wanted;
+  for (const fs::path& candidate : candidates) wanted += (wanted.empty() ? "" : " or ") + candidate.string();
+  throw std::runtime_error(path.string() + ": the folder holds no " + wanted);
+}
+
+/// The last `count` folders of a path and nothing else, or all of it if it has fewer.
+std::string last_parts(const fs::path& path, std::size_t count) {
+  const std::vector<fs::path> parts(path.begin(), path.end());
+  fs::path result;
+  for (std::size_t i = parts.size() - std::min(count, parts.size()); i < parts.size(); ++i) result /= parts[i];
+  return result.string();
+}
+
+/// Level 0: the stem. Level n: the n folders above a file, or the last n + 1 parts of a folder.
+std::string name_at_level(const fs::path& path, std::size_t level) {
+  const fs::path clean = path.has_filename() ? path : path.parent_path();
+  if (fs::is_directory(clean)) return last_parts(fs::absolute(clean).lexically_normal(), level + 1);
+  if (level == 0) return clean.stem().string();
+  return last_parts(fs::absolute(clean).lexically_normal().parent_path(), level);
+}
+
+bool all_different(const std::vector<std::string>& names) {
+  return std::set<std::string>(names.begin(), names.end()).size() == names.size();
+}
+
+}  // namespace
+
+Trajectory read_truth(const fs::path& path) {
+  return read_poses(
+      TextTable(file_in(path, {"mav0/state_groundtruth_estimate0/data.csv", "state_groundtruth_estimate0/data.csv"})));
+}
+
+Estimate read_estimate(const fs::path& path) {
+  const TextTable table(file_in(path, {"states.csv", "estimate.tum"}));
+  Estimate estimate;
+  estimate.poses = read_poses(table);
+  estimate.covariance = read_covariances(table);
+  estimate.mode = read_labels(table, "mode");
+  estimate.health = read_labels(table, "health");
+  return estimate;
+}
+
+std::vector<std::string> distinct_names(const std::vector<fs::path>& paths) {
+  constexpr std::size_t kDeepest = 8;
+  std::vector<std::string> names;
+  for (std::size_t level = 0; level <= kDeepest; ++level) {
+    names.clear();
+    for (const fs::path& path : paths) names.push_back(name_at_level(path, level));
+    if (all_different(names)) return names;
+  }
+  for (std::size_t i = 0; i < names.size(); ++i) names[i] = paths[i].string();
+  return names;
+}
+
+}  // namespace ear::evaluation

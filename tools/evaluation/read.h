@@ -1,0 +1,22 @@
+// Truths and estimates from files. All functions throw std::runtime_error that names file, line and field.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "tools/evaluation/trajectory.h"
+
+namespace ear::evaluation {
+
+/// The truth of a recording (its folder), or a file: EuRoC csv, TUM, or a states.csv.
+[[nodiscard]] Trajectory read_truth(const std::filesystem::path& path);
+
+/// An estimate: the output folder of a run (states.csv if it is there, else estimate.tum), or any file that read_truth
+/// takes. Only a states.csv holds covariance, mode and health. The name stays empty: see distinct_names().
+[[nodiscard]] Estimate read_estimate(const std::filesystem::path& path);
+
+/// Short names that tell the paths apart: the stem; where stems are equal, as many folders above it as it takes.
+[[nodiscard]] std::vector<std::string> distinct_names(const std::vector<std::filesystem::path>& paths);
+
+}  // namespace ear::evaluation

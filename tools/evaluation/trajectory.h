@@ -1,0 +1,36 @@
+// What an evaluation compares: timed poses of the body in a world, and an estimate with what it says about itself.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <string>
+#include <vector>
+
+#include "ear/types.h"
+
+namespace ear::evaluation {
+
+/// Pose of the body at one instant: p_W = q_WB * p_B + p_WB.
+struct Pose {
+  TimeNs t_ns = 0;
+  Eigen::Quaterniond q_WB = Eigen::Quaterniond::Identity();
+  Eigen::Vector3d p_WB = Eigen::Vector3d::Zero();  ///< [m]
+};
+
+/// Poses with strictly increasing times.
+using Trajectory = std::vector<Pose>;
+
+/// 6 x 6 covariance of (position, rotation): p_true - p_est [m] and e [rad] of R_true = Exp(e) R_est, both in the axes
+/// of the estimate's world.
+using PoseCovariance = Eigen::Matrix<double, 6, 6>;
+
+/// One estimated trajectory. `covariance`, `mode` and `health` are empty, or have one entry per pose.
+struct Estimate {
+  std::string name;
+  Trajectory poses;
+  std::vector<PoseCovariance> covariance;
+  std::vector<std::string> mode;    ///< what the estimator says it does, as written in its file
+  std::vector<std::string> health;  ///< how well it says it does it
+};
+
+}  // namespace ear::evaluation
