@@ -13,7 +13,7 @@ constexpr int kMargin = 10;                // [px] from the image's edge: the pa
 constexpr int kFastReach = 3;              // [px] radius of FAST's circle: cells are searched with this overlap
 constexpr std::array<int, 2> kThresholds{20, 7};  // grey steps of FAST, tried in this order
 constexpr std::size_t kCandidates = 5;     // of one cell, ranked by FAST's score, that are looked at closely
-constexpr float kMinStrength = 400.0F;     // [grey^2] 3 grey values of noise then move a patch by 0.15 px
+constexpr float kMinStrength = 1000.0F;     // [grey^2] 3 grey values of noise then move a patch by 0.15 px
 constexpr int kMaxPerCell = 3;
 
 bool far_from_all(const Eigen::Vector2f& pixel, const std::vector<Eigen::Vector2f>& others, float distance) {

@@ -182,25 +182,27 @@ Flags essential_inliers(const std::vector<Flow>& flows, double tolerance) {
 
 }  // namespace
 
-Flags FlowCheck::inliers(const std::vector<Flow>& flows, const MotionGuess& guess) {
-  if (flows.size() < kMinFlows) return Flags(flows.size(), 1);
+Consensus FlowCheck::find(const std::vector<Flow>& flows, const MotionGuess& guess) {
+  if (flows.size() < kMinFlows) return {Flags(flows.size(), 1), guess.motion, false};
   std::vector<std::size_t> with_depth;
   for (std::size_t i = 0; i < flows.size(); ++i) {
     if (flows[i].has_depth) with_depth.push_back(i);
   }
   const bool metric = with_depth.size() >= kMinDepths;
-  if (!metric && !guess.rotation_known) return essential_inliers(flows, tolerance_);
+  if (!metric && !guess.rotation_known) return {essential_inliers(flows, tolerance_), guess.motion, false};
 
   Problem problem{flows, tolerance_};
   Candidate best;
   best.motion = guess.motion;
-  if (!guess.translation_known) best.motion.p_10.setZero();
   best.flags = problem.classify(best.motion);
   best.inliers = count(best.flags);
-  const bool search_needed = static_cast<double>(best.inliers) < kGoodGuess * static_cast<double>(flows.size());
+  const auto enough = [&](std::size_t inliers) {
+    return static_cast<double>(inliers) >= kGoodGuess * static_cast<double>(flows.size());
+  };
+  const bool search_needed = !enough(best.inliers);
 
   if (!metric) {
-    if (!search_needed) return best.flags;
+    if (!search_needed) return {best.flags, best.motion, false};
     problem.depth_sigma_unknown = 1e3;  // the translation has unit length: depths have no unit
     std::vector<std::size_t> all(flows.size());
     std::iota(all.begin(), all.end(), std::size_t{0});
@@ -209,7 +211,7 @@ Flags FlowCheck::inliers(const std::vector<Flow>& flows, const MotionGuess& gues
       if (!p) return std::nullopt;
       return Transfer{guess.motion.R_10, *p};
     }, best);
-    return best.flags;
+    return {best.flags, guess.motion, false};
   }
 
   if (search_needed && guess.rotation_known) {
@@ -227,9 +229,12 @@ Flags FlowCheck::inliers(const std::vector<Flow>& flows, const MotionGuess& gues
   }
   // Gyroscope and prediction are not perfect: let the inliers correct them, then decide.
   const std::optional<Transfer> refined = refine(flows, best.flags, best.motion, kRefinements);
-  if (!refined) return best.flags;
-  Flags flags = problem.classify(*refined);
-  return count(flags) >= best.inliers ? flags : best.flags;
+  if (refined) {
+    Flags flags = problem.classify(*refined);
+    const std::size_t inliers = count(flags);
+    if (inliers >= best.inliers) best = {*refined, std::move(flags), inliers};
+  }
+  return {best.flags, best.motion, best.inliers >= kMinDepths && 2 * best.inliers > flows.size()};
 }
 
 }  // namespace ear

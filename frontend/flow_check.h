@@ -28,13 +28,20 @@ struct MotionGuess {
   bool translation_known = false;
 };
 
+/// What the flows say about the camera's motion.
+struct Consensus {
+  std::vector<std::uint8_t> inliers;  ///< one flag for each flow: 1 if it belongs to the static scene
+  Transfer motion;                    ///< first frame to second
+  bool metric = false;                ///< motion was measured, with its length, and most flows agree with it
+};
+
 class FlowCheck {
  public:
   /// `tolerance`: distance in normalized coordinates at which a feature stops being static.
   explicit FlowCheck(double tolerance) : tolerance_(tolerance) {}
 
-  /// One flag for each flow: 1 if it belongs to the static scene. With too few flows to tell, all are kept.
-  [[nodiscard]] std::vector<std::uint8_t> inliers(const std::vector<Flow>& flows, const MotionGuess& guess);
+  /// With too few flows to tell, all are inliers and the motion is the guess.
+  [[nodiscard]] Consensus find(const std::vector<Flow>& flows, const MotionGuess& guess);
 
  private:
   double tolerance_;

@@ -24,11 +24,11 @@ constexpr float kMinTrackDistance_px = 5.0F;    // two tracks closer than this h
 constexpr double kFlowTolerance_px = 2.0;
 constexpr double kDisparitySigma_px = 1.0;      // for the depth's part of that tolerance
 constexpr double kMapStep_px = 4.0;             // of the finite differences of a predicted affine map
-constexpr int kLevelPredicted = 1;              // where to begin with the full motion and the depth,
-constexpr int kLevelRotation = 2;               // with the rotation only,
-constexpr int kLevelUnknown = ImagePyramid::kMaxLevels - 1;  // and without either
-constexpr float kRefreshCorrelation = 0.85F;    // below, the feature is given a new reference patch
-constexpr float kRefreshStretch = 1.6F;         // and beyond this change of scale
+constexpr int kLevelMeasured = 0;               // where to begin: with depth and a motion measured in this frame,
+constexpr int kLevelPredicted = 2;              // with a predicted rotation,
+constexpr int kLevelUnknown = ImagePyramid::kMaxLevels - 1;  // and without
+constexpr std::size_t kProbes = 24;             // features that measure the motion for the others
+constexpr float kRefreshStretch = 1.6F;         // a feature that has grown or shrunk this much gets a new patch
 
 struct Track {
   std::uint64_t id = 0;
@@ -83,14 +83,16 @@ class Frontend::Impl {
 
  private:
   void track(const MotionPrediction& prediction);
-  bool track_one(Track& track, const Transfer& motion, const MotionPrediction& prediction);
-  void reject(const MotionPrediction& prediction);
+  [[nodiscard]] MotionGuess track_probes(const MotionGuess& guess, std::vector<std::uint8_t>& done);
+  [[nodiscard]] bool track_one(Track& track, const Transfer& motion, int level) const;
+  [[nodiscard]] Flow flow(std::size_t track) const;
+  void reject();
   void match_stereo();
   void match_stereo(Track& track, bool followed);
   void detect();
   void refresh_patches();
   void drop(const std::vector<std::uint8_t>& keep);
-  [[nodiscard]] Transfer camera_motion(const MotionPrediction& prediction) const;
+  [[nodiscard]] MotionGuess camera_motion(const MotionPrediction& prediction) const;
   [[nodiscard]] std::vector<Eigen::Vector2f> pixels() const;
   void write_output(TimeNs t_ns);
 
@@ -104,6 +106,7 @@ class Frontend::Impl {
   ImagePyramid left_;
   ImagePyramid right_;
   bool right_present_ = false;
+  MotionGuess motion_;           // of the left camera, last frame to this one
   std::vector<Track> tracks_;
   std::vector<Track> previous_;  // the same tracks, index by index, before this frame
   std::vector<ReferencePatch> patches_;
@@ -143,7 +146,7 @@ const FeatureFrame& Frontend::Impl::process(const StereoFrame& frame, const Moti
   timing.pyramid = watch.lap();
   track(prediction);
   timing.track = watch.lap();
-  reject(prediction);
+  reject();
   timing.reject = watch.lap();
   quality.tracked = static_cast<int>(tracks_.size());
   match_stereo();
@@ -156,22 +159,30 @@ const FeatureFrame& Frontend::Impl::process(const StereoFrame& frame, const Moti
   return output_;
 }
 
-Transfer Frontend::Impl::camera_motion(const MotionPrediction& prediction) const {
+MotionGuess Frontend::Impl::camera_motion(const MotionPrediction& prediction) const {
+  MotionGuess guess;
+  guess.rotation_known = prediction.rotation_known;
+  guess.translation_known = prediction.rotation_known && prediction.translation_known;
   Eigen::Isometry3d T_B1B0 = Eigen::Isometry3d::Identity();
-  if (prediction.rotation_known) T_B1B0.linear() = prediction.R_B1B0;
-  if (prediction.rotation_known && prediction.translation_known) {
-    T_B1B0.translation() = -(prediction.R_B1B0 * prediction.p_B0B1);
-  }
+  if (guess.rotation_known) T_B1B0.linear() = prediction.R_B1B0;
+  if (guess.translation_known) T_B1B0.translation() = -(prediction.R_B1B0 * prediction.p_B0B1);
   const Eigen::Isometry3d& T_BC = cameras_.front().T_BC;
   const Eigen::Isometry3d T_C1C0 = T_BC.inverse() * T_B1B0 * T_BC;
-  return {T_C1C0.linear(), T_C1C0.translation()};
+  guess.motion = {T_C1C0.linear(), T_C1C0.translation()};
+  return guess;
 }
 
 void Frontend::Impl::track(const MotionPrediction& prediction) {
-  const Transfer motion = camera_motion(prediction);
   previous_ = tracks_;
-  std::vector<std::uint8_t> keep(tracks_.size());
-  for (std::size_t i = 0; i < tracks_.size(); ++i) keep[i] = track_one(tracks_[i], motion, prediction);
+  std::vector<std::uint8_t> keep(tracks_.size(), 0);
+  motion_ = track_probes(camera_motion(prediction), keep);
+  const int known = motion_.rotation_known ? kLevelPredicted : kLevelUnknown;
+  for (std::size_t i = 0; i < tracks_.size(); ++i) {
+    if (keep[i]) continue;
+    const bool predictable = motion_.translation_known && tracks_[i].has_depth;
+    keep[i] = (predictable && track_one(tracks_[i], motion_.motion, kLevelMeasured)) ||
+              track_one(tracks_[i], motion_.motion, known);
+  }
   // Of two tracks that have run into each other, the younger goes. Older ones come first.
   for (std::size_t i = 0; i < tracks_.size(); ++i) {
     for (std::size_t j = 0; j < i && keep[i]; ++j) {
@@ -182,7 +193,36 @@ void Frontend::Impl::track(const MotionPrediction& prediction) {
   drop(keep);
 }
 
-bool Frontend::Impl::track_one(Track& track, const Transfer& motion, const MotionPrediction& prediction) {
+// Follows a few features from coarse to fine. If they agree on a motion, it is better than any prediction, and all
+// others are found at once on the finest level.
+MotionGuess Frontend::Impl::track_probes(const MotionGuess& guess, std::vector<std::uint8_t>& done) {
+  std::vector<std::size_t> candidates;
+  for (std::size_t i = 0; i < tracks_.size(); ++i) {
+    if (tracks_[i].has_depth) candidates.push_back(i);
+  }
+  const std::size_t stride = std::max<std::size_t>(1, candidates.size() / kProbes);
+  std::vector<std::size_t> probes;
+  std::vector<Flow> flows;
+  for (std::size_t k = 0; k < candidates.size(); k += stride) {
+    const std::size_t i = candidates[k];
+    Track& track = tracks_[i];
+    if (!track_one(track, guess.motion, guess.rotation_known ? kLevelPredicted : kLevelUnknown) &&
+        !track_one(track, guess.motion, kLevelUnknown)) {
+      continue;
+    }
+    probes.push_back(i);
+    flows.push_back(flow(i));
+  }
+  const Consensus consensus = flow_check_.find(flows, guess);
+  for (std::size_t k = 0; k < probes.size(); ++k) {
+    done[probes[k]] = consensus.inliers[k];
+    if (!consensus.inliers[k]) tracks_[probes[k]] = previous_[probes[k]];  // to be tried again like the others
+  }
+  if (!consensus.metric) return guess;
+  return {consensus.motion, true, true};
+}
+
+bool Frontend::Impl::track_one(Track& track, const Transfer& motion, int level) const {
   const double inverse_depth = track.has_depth ? track.inverse_depth : 0.0;
   const auto move = [&](const Eigen::Vector2d& ray) -> std::optional<Eigen::Vector2d> {
     const Eigen::Vector3d point = motion.scaled_point(ray, inverse_depth);
@@ -203,16 +243,13 @@ bool Frontend::Impl::track_one(Track& track, const Transfer& motion, const Motio
     start.affine = change.cast<float>() * track.left.affine;
   }
 
-  const bool full = prediction.rotation_known && prediction.translation_known && track.has_depth;
-  const int level = full ? kLevelPredicted : prediction.rotation_known ? kLevelRotation : kLevelUnknown;
-  const ReferencePatch& patch = patches_[track.patch];
-  auto match = patch.align(left_, start, level);
-  if (!match && level < kLevelUnknown) match = patch.align(left_, start, kLevelUnknown);
+  const auto match = patches_[track.patch].align(left_, start, level);
   if (!match) return false;
-
   const Eigen::Vector2f& found = match->warp.centre;
   const GreyLevel& image = left_.level(0);
-  const auto in = [](float value, int size) { return value >= kEdge_px && value <= static_cast<float>(size - 1) - kEdge_px; };
+  const auto in = [](float value, int size) {
+    return value >= kEdge_px && value <= static_cast<float>(size - 1) - kEdge_px;
+  };
   if (!in(found.x(), image.width) || !in(found.y(), image.height)) return false;
   const auto ray = lens_.to_normalized(found.cast<double>());
   if (!ray) return false;
@@ -224,16 +261,17 @@ bool Frontend::Impl::track_one(Track& track, const Transfer& motion, const Motio
   return true;
 }
 
-void Frontend::Impl::reject(const MotionPrediction& prediction) {
+Flow Frontend::Impl::flow(std::size_t track) const {
+  const Track& before = previous_[track];
   const double sigma = stereo_ ? kDisparitySigma_px * stereo_->inverse_depth_per_pixel() : 0.0;
+  return {before.left_ray, tracks_[track].left_ray, before.inverse_depth, sigma, before.has_depth};
+}
+
+void Frontend::Impl::reject() {
   std::vector<Flow> flows;
   flows.reserve(tracks_.size());
-  for (std::size_t i = 0; i < tracks_.size(); ++i) {
-    const Track& before = previous_[i];
-    flows.push_back({before.left_ray, tracks_[i].left_ray, before.inverse_depth, sigma, before.has_depth});
-  }
-  drop(flow_check_.inliers(flows, {camera_motion(prediction), prediction.rotation_known,
-                                   prediction.rotation_known && prediction.translation_known}));
+  for (std::size_t i = 0; i < tracks_.size(); ++i) flows.push_back(flow(i));
+  drop(flow_check_.find(flows, motion_).inliers);
 }
 
 void Frontend::Impl::match_stereo() {

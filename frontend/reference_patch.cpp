@@ -12,6 +12,7 @@ constexpr int kPositionSteps = 6;      // on the base level, before the affine m
 constexpr float kPositionSettled = 0.25F;
 constexpr int kAffineSteps = 6;
 constexpr float kAffineSettled = 0.015F;
+constexpr float kMaxUnsettled = 0.15F;  // [px] a last step this long is still a match: noise keeps weak patches moving
 constexpr float kMaxStretch = 2.5F;  // of the affine map: beyond, the patch is no longer what it was
 
 Warp scaled(const Warp& warp, int level) { return {warp.centre / static_cast<float>(1 << level), warp.affine}; }
@@ -62,14 +63,15 @@ std::optional<ReferencePatch::Match> ReferencePatch::align(const ImagePyramid& p
     if (!done) return std::nullopt;
     if (done->moved < kPositionSettled) break;
   }
+  PatchLevel::Step last;
   for (int step = 0; step < kAffineSteps; ++step) {
     const auto done = base.step_affine(image, start.affine, warp);
     if (!done || !plausible(warp.affine)) return std::nullopt;
-    if (done->moved > kAffineSettled) continue;
-    if (done->correlation < kMinCorrelation) return std::nullopt;
-    return Match{warp, done->correlation};
+    last = *done;
+    if (last.moved < kAffineSettled) break;
   }
-  return std::nullopt;
+  if (last.moved > kMaxUnsettled || last.correlation < kMinCorrelation) return std::nullopt;
+  return Match{warp, last.correlation};
 }
 
 }  // namespace ear
