@@ -5,36 +5,31 @@
 
 namespace ear {
 
-double normal_quantile(double probability) {
-  // Newton on the cumulative distribution; it is concave above and convex below zero, and a start at 0 never
-  // overshoots.
-  constexpr double kSqrt2 = 1.4142135623730951;
-  constexpr double kInvSqrt2Pi = 0.3989422804014327;
-  double x = 0.0;
-  for (int i = 0; i < 100; ++i) {
-    const double excess = 0.5 * std::erfc(-x / kSqrt2) - probability;
-    const double step = excess / (kInvSqrt2Pi * std::exp(-0.5 * x * x));
-    x -= step;
-    if (std::abs(step) < 1e-12) break;
+double chi_squared_probability(double x, int dof) {
+  if (x <= 0.0) return 0.0;
+  // Regularized incomplete gamma function by its series, Abramowitz and Stegun 6.5.29.
+  const double a = 0.5 * dof;
+  const double half = 0.5 * x;
+  double term = std::exp(a * std::log(half) - half - std::lgamma(a + 1.0));
+  double sum = term;
+  for (int n = 1; n < 10000 && term > 1e-16 * sum; ++n) {
+    term *= half / (a + n);
+    sum += term;
   }
-  return x;
+  return std::min(sum, 1.0);
 }
 
 ChiSquaredGate::ChiSquaredGate(double probability, int max_dof) {
-  const double z = normal_quantile(probability);
   quantiles_.reserve(static_cast<std::size_t>(max_dof));
   for (int dof = 1; dof <= max_dof; ++dof) {
-    if (dof == 1) {  // exact: the square of a normal variable
-      const double two_sided = normal_quantile(0.5 + 0.5 * probability);
-      quantiles_.push_back(two_sided * two_sided);
-      continue;
+    double low = 0.0;
+    double high = 10.0;
+    while (chi_squared_probability(high, dof) < probability && high < 1e4) high *= 2.0;
+    for (int i = 0; i < 50; ++i) {
+      const double middle = 0.5 * (low + high);
+      (chi_squared_probability(middle, dof) < probability ? low : high) = middle;
     }
-    if (dof == 2) {  // exact: exponential
-      quantiles_.push_back(-2.0 * std::log1p(-probability));
-      continue;
-    }
-    const double a = 2.0 / (9.0 * dof);
-    quantiles_.push_back(dof * std::pow(1.0 - a + z * std::sqrt(a), 3));
+    quantiles_.push_back(0.5 * (low + high));
   }
 }
 

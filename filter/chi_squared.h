@@ -8,7 +8,7 @@ namespace ear {
 /// Quantiles of the chi-squared distribution at one probability, for 1 to max_dof degrees of freedom.
 class ChiSquaredGate {
  public:
-  /// `probability` in (0, 1). Wilson and Hilferty (1931): within 0.5 % for the probabilities that gates use.
+  /// `probability` in (0, 1).
   ChiSquaredGate(double probability, int max_dof);
 
   /// The quantile; the largest dof stands for all above.
@@ -18,7 +18,7 @@ class ChiSquaredGate {
   std::vector<double> quantiles_;  // [dof - 1]
 };
 
-/// The quantile of the standard normal distribution, |error| < 1e-8. `probability` in (0, 1).
-[[nodiscard]] double normal_quantile(double probability);
+/// Probability that a chi-squared variable of `dof` degrees of freedom is below x.
+[[nodiscard]] double chi_squared_probability(double x, int dof);
 
 }  // namespace ear

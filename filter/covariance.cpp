@@ -78,7 +78,7 @@ Eigen::Ref<const Eigen::VectorXd> Covariance::update(const Eigen::Ref<const Eige
   correction.setZero();
   Eigen::Ref<Eigen::MatrixXd> factor = S;
   const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> llt(factor);  // in place
-  if (llt.info() != Eigen::Success || !residual.allFinite()) return correction;
+  if (llt.info() != Eigen::Success || !residual.allFinite() || !H.allFinite()) return correction;
   z = residual;
   llt.matrixL().solveInPlace(z);
   llt.matrixU().solveInPlace<Eigen::OnTheRight>(PHt);  // Y = P H^T L^-T, so that P H^T S^-1 H P = Y Y^T

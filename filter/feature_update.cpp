@@ -10,7 +10,7 @@ namespace ear {
 namespace {
 
 constexpr int kCalibration = 12;            // columns of the cameras' poses; the time offset acts through the clones
-constexpr double kNegligiblePivot = 1e-13;  // of the largest: rounding of the sums, not information
+constexpr double kNegligiblePivot = 1e-11;  // of the sum before projection: rounding, not information
 
 /// First column of a clone, counted from err::camera.
 constexpr int clone_column(int clone) { return err::clone(clone) - err::camera; }
@@ -110,7 +110,7 @@ bool FeatureInformation::add_gated(const std::vector<LinearizedObservation>& obs
     v.noalias() += w * z.H_f.transpose() * z.residual;
     cost += w * z.residual.squaredNorm();
   }
-  V.diagonal().array() += 1e-9 * V.trace();  // a point at infinity has no depth to project out
+  V.diagonal().array() += 1e-13 * V.trace();  // a point at infinity has no depth to project out
   const Eigen::LLT<Eigen::Matrix3d> V_llt(V);
   if (V_llt.info() != Eigen::Success || !std::isfinite(cost)) return false;
   const Eigen::Vector3d Lv = V_llt.matrixL().solve(v);
@@ -164,24 +164,26 @@ void FeatureInformation::compress() {
   rows_ = 0;
   if (features_ == 0) return;
   auto A = A_.topLeftCorner(size_, size_);
+  const Eigen::VectorXd before = A.diagonal();
   A.selfadjointView<Eigen::Lower>().rankUpdate(W_.topLeftCorner(size_, 3 * features_), -1.0);
 
-  // A = T^T L D L^T T with the largest pivots first. A is singular (yaw and position are free, calibration is seen in
-  // part): what is lost in rounding comes last and is left out. Rows: D^1/2 L^T T, residuals: D^-1/2 L^-1 T b.
-  Eigen::Ref<Eigen::MatrixXd> factor = A;
-  const Eigen::LDLT<Eigen::Ref<Eigen::MatrixXd>> ldlt(factor);  // in place
-  const auto D = ldlt.vectorD();
-  while (rows_ < size_ && D(rows_) > kNegligiblePivot * D(0)) ++rows_;
-  auto H = H_.topLeftCorner(size_, size_);
-  H = ldlt.matrixU();
-  H = H * ldlt.transpositionsP();
-  auto r = r_.head(size_);
-  r = ldlt.transpositionsP() * b_.head(size_);
-  ldlt.matrixL().solveInPlace(r);
-  for (int i = 0; i < rows_; ++i) {
-    const double root = std::sqrt(D(i));
-    H_.row(i).head(size_) *= root;
-    r_(i) /= root;
+  // A = U^T U by Cholesky; the rows of U and U^-T b are the measurement. A is singular (yaw and position are free,
+  // calibration is seen in part): a pivot lost in rounding says nothing, and its row is left out.
+  auto b = b_.head(size_);
+  for (int j = 0; j < size_; ++j) {
+    const double pivot = A(j, j);
+    if (pivot <= kNegligiblePivot * before(j)) continue;
+    const int rest = size_ - j - 1;
+    const double root = std::sqrt(pivot);
+    auto u = A.col(j).tail(rest);
+    u /= root;
+    H_.row(rows_).head(j).setZero();
+    H_(rows_, j) = root;
+    H_.row(rows_).segment(j + 1, rest) = u.transpose();
+    r_(rows_) = b(j) / root;
+    b.tail(rest) -= r_(rows_) * u;
+    A.bottomRightCorner(rest, rest).selfadjointView<Eigen::Lower>().rankUpdate(u, -1.0);
+    ++rows_;
   }
 }
 

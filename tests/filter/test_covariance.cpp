@@ -1,0 +1,134 @@
+#include <doctest/doctest.h>
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <random>
+
+#include "filter/covariance.h"
+#include "tests/support/random_state.h"
+
+using namespace ear;
+using namespace ear::test;
+
+namespace {
+
+Eigen::MatrixXd random_matrix(std::mt19937_64& rng, Eigen::Index rows, Eigen::Index columns) {
+  std::normal_distribution<double> normal;
+  Eigen::MatrixXd m(rows, columns);
+  for (auto& value : m.reshaped()) value = normal(rng);
+  return m;
+}
+
+ErrorTransition random_transition(std::mt19937_64& rng) {
+  ErrorTransition transition;
+  transition.Phi += 0.1 * random_matrix(rng, err::imu_size, err::imu_size);
+  const Eigen::MatrixXd half = 0.1 * random_matrix(rng, err::imu_size, err::imu_size);
+  transition.Q = half * half.transpose();
+  return transition;
+}
+
+/// A covariance with two clones and correlations everywhere.
+Covariance filled(std::mt19937_64& rng) {
+  Covariance P(err::clone(4));
+  P.reset(Eigen::VectorXd::Constant(err::clones, 0.5));
+  for (int i = 0; i < 2; ++i) {
+    P.propagate(random_transition(rng));
+    P.append_clone(random_matrix(rng, 6, err::imu_size), random_matrix(rng, 6, 1));
+  }
+  P.propagate(random_transition(rng));
+  return P;
+}
+
+}  // namespace
+
+TEST_CASE("covariance: propagation and cloning are the full matrix products") {
+  std::mt19937_64 rng{31};
+  Covariance P(err::clone(3));
+  P.reset(Eigen::VectorXd::LinSpaced(err::clones, 0.1, 1.0));
+  const auto imu_jacobian = random_matrix(rng, 6, err::imu_size);
+  const auto offset_jacobian = random_matrix(rng, 6, 1);
+  const Eigen::MatrixXd before = P.matrix();
+  P.append_clone(imu_jacobian, offset_jacobian);
+  Eigen::MatrixXd J = Eigen::MatrixXd::Zero(err::clone(1), err::clones);
+  J.topRows(err::clones).setIdentity();
+  J.bottomLeftCorner(6, err::imu_size) = imu_jacobian;
+  J.bottomRows(6).col(err::time_offset) = offset_jacobian;
+  CHECK((P.matrix() - J * before * J.transpose()).norm() < 1e-12);
+
+  const ErrorTransition transition = random_transition(rng);
+  const Eigen::MatrixXd cloned = P.matrix();
+  P.propagate(transition);
+  Eigen::MatrixXd Phi = Eigen::MatrixXd::Identity(P.size(), P.size());
+  Eigen::MatrixXd Q = Eigen::MatrixXd::Zero(P.size(), P.size());
+  Phi.topLeftCorner<err::imu_size, err::imu_size>() = transition.Phi;
+  Q.topLeftCorner<err::imu_size, err::imu_size>() = transition.Q;
+  CHECK((P.matrix() - (Phi * cloned * Phi.transpose() + Q)).norm() < 1e-12);
+}
+
+TEST_CASE("covariance: removing takes out rows and columns, and nothing else") {
+  std::mt19937_64 rng{32};
+  Covariance P = filled(rng);
+  const Eigen::MatrixXd before = P.matrix();
+  P.remove(err::clone(0), err::clone_size);
+  std::vector<int> kept;
+  for (int i = 0; i < err::clone(2); ++i) {
+    if (i < err::clone(0) || i >= err::clone(1)) kept.push_back(i);
+  }
+  CHECK(P.size() == err::clone(1));
+  CHECK((P.matrix() - before(kept, kept)).norm() == 0.0);
+}
+
+TEST_CASE("covariance: the update is Kalman's, and stays symmetric and positive") {
+  std::mt19937_64 rng{33};
+  Covariance P = filled(rng);
+  const Eigen::MatrixXd before = P.matrix();
+  const int first = err::camera;
+  const Eigen::MatrixXd part = random_matrix(rng, 7, P.size() - first);
+  const Eigen::VectorXd r = random_matrix(rng, 7, 1);
+  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(7, P.size());
+  H.rightCols(part.cols()) = part;
+  const Eigen::MatrixXd S = H * before * H.transpose() + Eigen::MatrixXd::Identity(7, 7);
+  const Eigen::MatrixXd K = before * H.transpose() * S.inverse();
+  const Eigen::VectorXd correction = P.update(part, first, r);
+  CHECK((correction - K * r).norm() < 1e-9);
+  CHECK((P.matrix() - (before - K * S * K.transpose())).norm() < 1e-9);
+  CHECK((P.matrix() - P.matrix().transpose()).norm() == 0.0);
+  CHECK(Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(P.matrix()).eigenvalues().minCoeff() > 0.0);
+}
+
+TEST_CASE("covariance: what is only considered keeps value and variance, the rest knows less than with it") {
+  std::mt19937_64 rng{34};
+  Covariance learned = filled(rng);
+  Covariance considered = learned;
+  const Eigen::MatrixXd before = learned.matrix();
+  const Eigen::MatrixXd H = random_matrix(rng, 5, before.rows());
+  const Eigen::VectorXd r = random_matrix(rng, 5, 1);
+  learned.update(H, 0, r);
+  const Eigen::VectorXd correction = considered.update(H, 0, r, err::camera, err::calibration_size);
+  CHECK(correction.segment<err::calibration_size>(err::camera).norm() == 0.0);
+  const auto calibration = [](const Eigen::MatrixXd& m) {
+    return m.block<err::calibration_size, err::calibration_size>(err::camera, err::camera).eval();
+  };
+  CHECK((calibration(considered.matrix()) - calibration(before)).norm() == 0.0);
+  // The Schmidt-Kalman covariance from its definition: gain rows of the considered part zero, Joseph form.
+  const Eigen::MatrixXd S = H * before * H.transpose() + Eigen::MatrixXd::Identity(5, 5);
+  Eigen::MatrixXd K = before * H.transpose() * S.inverse();
+  K.middleRows(err::camera, err::calibration_size).setZero();
+  const Eigen::MatrixXd I_KH = Eigen::MatrixXd::Identity(before.rows(), before.rows()) - K * H;
+  CHECK((considered.matrix() - (I_KH * before * I_KH.transpose() + K * K.transpose())).norm() < 1e-9);
+}
+
+TEST_CASE("covariance: rows that are not numbers change nothing") {
+  std::mt19937_64 rng{35};
+  Covariance P = filled(rng);
+  const Eigen::MatrixXd before = P.matrix();
+  Eigen::MatrixXd H = random_matrix(rng, 2, before.rows());
+  Eigen::VectorXd r = random_matrix(rng, 2, 1);
+  r(1) = std::nan("");
+  CHECK(P.update(H, 0, r).norm() == 0.0);
+  CHECK((P.matrix() - before).norm() == 0.0);
+  r(1) = 0.0;
+  H(0, 3) = std::nan("");
+  CHECK(P.update(H, 0, r).norm() == 0.0);
+  CHECK((P.matrix() - before).norm() == 0.0);
+}

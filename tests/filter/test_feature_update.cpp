@@ -1,0 +1,234 @@
+#include <doctest/doctest.h>
+
+#include <Eigen/LU>
+#include <Eigen/QR>
+#include <random>
+
+#include "filter/chi_squared.h"
+#include "filter/covariance.h"
+#include "filter/feature_update.h"
+#include "tests/support/check_jacobian.h"
+#include "tests/support/random_state.h"
+
+using namespace ear;
+using namespace ear::test;
+
+namespace {
+
+constexpr double kSigma = 1e-3;
+
+/// A point seen by both cameras of all clones, with noise; the point is triangulated, as the filter does it.
+struct Scene {
+  State x;
+  InverseDepthPoint point;
+  std::vector<LinearizedObservation> observations;
+  std::vector<Sighting> sightings;
+};
+
+/// What camera 0 or 1 of a clone sees of a point; the test's own projection.
+Eigen::Vector2d project(const State& x, int clone, int camera, const Eigen::Vector3d& f_W) {
+  const Pose& T_WB = x.clones[static_cast<std::size_t>(clone)].T_WB;
+  const Eigen::Vector3d f_B = T_WB.R.inverse() * (f_W - T_WB.p);
+  Eigen::Vector3d f_C = x.camera.T_BC0.R.inverse() * (f_B - x.camera.T_BC0.p);
+  if (camera == 1) f_C = x.camera.T_C0C1.R.inverse() * (f_C - x.camera.T_C0C1.p);
+  return {f_C.x() / f_C.z(), f_C.y() / f_C.z()};
+}
+
+Scene random_scene(std::mt19937_64& rng, int clones, double outlier = 0.0) {
+  Scene scene;
+  scene.x = random_state(rng, clones);
+  std::vector<CameraPose> cameras;
+  camera_poses(scene.x, cameras);
+  const Eigen::Vector3d ahead = scene.x.camera.T_BC0.p + scene.x.camera.T_BC0.R * Eigen::Vector3d(0.3, -0.2, 4.0);
+  const Eigen::Vector3d f_W = scene.x.imu.R_WB * ahead + scene.x.imu.p_WB;
+  std::vector<std::pair<int, int>> who;
+  for (int i = 0; i < clones; ++i) {
+    for (int camera = 0; camera < 2; ++camera) {
+      Eigen::Vector2d uv = project(scene.x, i, camera, f_W) + kSigma * random_vector(rng, 1.0).head<2>();
+      if (i == 1 && camera == 0) uv.x() += outlier;
+      const CameraPose& pose = cameras[static_cast<std::size_t>(2 * i + camera)];
+      scene.sightings.push_back({pose.R_CW, pose.p_WC, uv});
+      who.emplace_back(i, camera);
+    }
+  }
+  const auto point = triangulate(scene.sightings);
+  REQUIRE(point);
+  scene.point = *point;
+  for (std::size_t k = 0; k < who.size(); ++k) {
+    scene.observations.push_back(
+        linearize_observation(scene.x, who[k].first, who[k].second, scene.point, scene.sightings[k].uv));
+  }
+  return scene;
+}
+
+/// All rows of a feature over the full error vector, whitened.
+void stack(const Scene& scene, Eigen::MatrixXd& H_x, Eigen::MatrixXd& H_f, Eigen::VectorXd& r) {
+  const auto rows = static_cast<Eigen::Index>(2 * scene.observations.size());
+  H_x = Eigen::MatrixXd::Zero(rows, scene.x.error_size());
+  H_f.resize(rows, 3);
+  r.resize(rows);
+  for (std::size_t k = 0; k < scene.observations.size(); ++k) {
+    const LinearizedObservation& z = scene.observations[k];
+    const auto row = static_cast<Eigen::Index>(2 * k);
+    H_x.block<2, 12>(row, err::camera) = z.H_calibration / kSigma;
+    H_x.block<2, 6>(row, err::clone(z.clone)) = z.H_clone / kSigma;
+    H_f.middleRows<2>(row) = z.H_f / kSigma;
+    r.segment<2>(row) = z.residual / kSigma;
+  }
+}
+
+/// The textbook form: left null space of H_f.
+void project_out(Eigen::MatrixXd& H_x, const Eigen::MatrixXd& H_f, Eigen::VectorXd& r) {
+  const Eigen::MatrixXd Q = H_f.householderQr().householderQ();
+  const Eigen::MatrixXd N = Q.rightCols(Q.cols() - 3);
+  H_x = (N.transpose() * H_x).eval();
+  r = (N.transpose() * r).eval();
+}
+
+Covariance some_covariance(std::mt19937_64& rng, const State& x) {
+  Covariance P(x.error_size());
+  P.reset(Eigen::VectorXd::Constant(err::clones, 0.01));
+  for (std::size_t i = 0; i < x.clones.size(); ++i) {
+    ErrorTransition walk;
+    walk.Q.diagonal().setConstant(1e-5);
+    P.propagate(walk);
+    Eigen::Matrix<double, 6, err::imu_size> J = Eigen::Matrix<double, 6, err::imu_size>::Zero();
+    J.block<3, 3>(0, err::theta).setIdentity();
+    J.block<3, 3>(3, err::rho).setIdentity();
+    P.append_clone(J, random_vector(rng, 0.1).homogeneous().replicate<2, 1>().head<6>());
+  }
+  return P;
+}
+
+}  // namespace
+
+TEST_CASE("feature: H is the derivative of the observation, for both cameras, calibration included") {
+  std::mt19937_64 rng{61};
+  for (int trial = 0; trial < 10; ++trial) {
+    for (int camera = 0; camera < 2; ++camera) {
+      CAPTURE(trial);
+      CAPTURE(camera);
+      const Scene scene = random_scene(rng, 3);
+      const Eigen::Vector3d f_W = scene.point.scaled_W() / scene.point.inverse_depth;
+      const LinearizedObservation z = linearize_observation(scene.x, 1, camera, scene.point, Eigen::Vector2d::Zero());
+      Eigen::MatrixXd H = Eigen::MatrixXd::Zero(2, scene.x.error_size());
+      H.block<2, 12>(0, err::camera) = z.H_calibration;
+      H.block<2, 6>(0, err::clone(1)) = z.H_clone;
+      check_jacobian(
+          [&](const Eigen::VectorXd& d) -> Eigen::VectorXd { return project(boxplus(scene.x, d), 1, camera, f_W); }, H);
+      check_jacobian(
+          [&](const Eigen::VectorXd& d) -> Eigen::VectorXd {
+            return project(scene.x, 1, camera, f_W + d / scene.point.inverse_depth);
+          },
+          z.H_f);
+      CHECK((z.residual + project(scene.x, 1, camera, f_W)).norm() < 1e-9);
+    }
+  }
+}
+
+TEST_CASE("feature: the summed information is the null-space projection") {
+  std::mt19937_64 rng{62};
+  const Scene scene = random_scene(rng, 5);
+  Eigen::MatrixXd H_x, H_f;
+  Eigen::VectorXd r;
+  stack(scene, H_x, H_f, r);
+  project_out(H_x, H_f, r);
+  FeatureInformation information(5, 4);
+  information.start(scene.x.error_size());
+  Covariance P = some_covariance(rng, scene.x);
+  REQUIRE(information.add(scene.observations, kSigma, 1e9, P.matrix(), [](int) { return 1e9; }));
+  information.compress();
+  const Eigen::MatrixXd H = information.H();
+  const Eigen::MatrixXd expected = (H_x.transpose() * H_x).bottomRightCorner(H.cols(), H.cols());
+  CHECK((H.transpose() * H - expected).norm() < 1e-8 * expected.norm());
+  const Eigen::VectorXd expected_b = (H_x.transpose() * r).tail(H.cols());
+  CHECK((H.transpose() * information.residual() - expected_b).norm() < 1e-8 * expected_b.norm());
+}
+
+TEST_CASE("feature: an update by two features is that of their stacked rows") {
+  std::mt19937_64 rng{63};
+  Scene one = random_scene(rng, 4);
+  Covariance P = some_covariance(rng, one.x);
+  Covariance reference = P;
+  FeatureInformation information(4, 4);
+  information.start(one.x.error_size());
+  Eigen::MatrixXd H_all(0, one.x.error_size());
+  Eigen::VectorXd r_all(0);
+  for (int feature = 0; feature < 2; ++feature) {
+    Scene scene = one;
+    for (auto& z : scene.observations) z.residual += kSigma * random_vector(rng, 1.0).head<2>();
+    Eigen::MatrixXd H_x, H_f;
+    Eigen::VectorXd r;
+    stack(scene, H_x, H_f, r);
+    project_out(H_x, H_f, r);
+    H_all = (Eigen::MatrixXd(H_all.rows() + H_x.rows(), H_x.cols()) << H_all, H_x).finished();
+    r_all = (Eigen::VectorXd(r_all.size() + r.size()) << r_all, r).finished();
+    REQUIRE(information.add(scene.observations, kSigma, 1e9, P.matrix(), [](int) { return 1e9; }));
+  }
+  information.compress();
+  // The textbook Kalman update in information form.
+  const Eigen::MatrixXd P0 = P.matrix();
+  const Eigen::MatrixXd S = H_all * P0 * H_all.transpose() + Eigen::MatrixXd::Identity(H_all.rows(), H_all.rows());
+  const Eigen::VectorXd expected = P0 * H_all.transpose() * S.ldlt().solve(r_all);
+  const Eigen::VectorXd correction = P.update(information.H(), err::camera, information.residual());
+  CHECK((correction - expected).norm() < 1e-6 * expected.norm());
+  CHECK((P.matrix() - (P0 - P0 * H_all.transpose() * S.ldlt().solve(H_all * P0))).norm() < 1e-6 * P0.norm());
+}
+
+TEST_CASE("feature: the gate is the chi-square of the projected innovation") {
+  std::mt19937_64 rng{64};
+  for (int trial = 0; trial < 20; ++trial) {
+    CAPTURE(trial);
+    const Scene scene = random_scene(rng, 4, 0.002 * trial);
+    const Covariance P = some_covariance(rng, scene.x);
+    Eigen::MatrixXd H_x, H_f;
+    Eigen::VectorXd r;
+    stack(scene, H_x, H_f, r);
+    project_out(H_x, H_f, r);
+    const Eigen::MatrixXd S = H_x * P.matrix() * H_x.transpose() + Eigen::MatrixXd::Identity(r.size(), r.size());
+    const double statistic = r.dot(S.ldlt().solve(r));
+    FeatureInformation information(4, 4);
+    int asked_dof = 0;
+    const auto passes = [&](double threshold) {
+      information.start(scene.x.error_size());
+      return information.add(scene.observations, kSigma, 1e9, P.matrix(), [&](int dof) {
+        asked_dof = dof;
+        return threshold;
+      });
+    };
+    CHECK(passes(1.001 * statistic + 1e-6));
+    CHECK_FALSE(passes(0.999 * statistic - 1e-6));
+    CHECK(asked_dof == r.size());
+  }
+}
+
+TEST_CASE("feature: a common turn about gravity and a common shift cannot be seen") {
+  std::mt19937_64 rng{65};
+  const Scene scene = random_scene(rng, 4);
+  FeatureInformation information(4, 4);
+  information.start(scene.x.error_size());
+  const Covariance P = some_covariance(rng, scene.x);
+  REQUIRE(information.add(scene.observations, kSigma, 1e9, P.matrix(), [](int) { return 1e9; }));
+  information.compress();
+  Eigen::MatrixXd N = Eigen::MatrixXd::Zero(information.H().cols(), 4);
+  for (int i = 0; i < 4; ++i) {
+    N.block<3, 1>(err::clone(i) - err::camera, 0) = Eigen::Vector3d::UnitZ();
+    N.block<3, 3>(err::clone(i) - err::camera + 3, 1).setIdentity();
+  }
+  CHECK((information.H() * N).norm() < 1e-5 * information.H().norm());
+}
+
+TEST_CASE("feature: an outlier weighs less with Huber") {
+  std::mt19937_64 rng{66};
+  const Scene scene = random_scene(rng, 5, 0.01);
+  const Covariance P = some_covariance(rng, scene.x);
+  const auto correction_norm = [&](double huber) {
+    FeatureInformation information(5, 4);
+    information.start(scene.x.error_size());
+    REQUIRE(information.add(scene.observations, kSigma, huber, P.matrix(), [](int) { return 1e9; }));
+    information.compress();
+    Covariance updated = P;
+    return updated.update(information.H(), err::camera, information.residual()).norm();
+  };
+  CHECK(correction_norm(2.0) < 0.7 * correction_norm(1e9));
+}

@@ -1,0 +1,63 @@
+#include <doctest/doctest.h>
+
+#include "filter/imu_buffer.h"
+
+using namespace ear;
+
+namespace {
+
+/// gyro.x = t in seconds: the integral over [a, b] is (b^2 - a^2) / 2.
+ImuBuffer ramp(std::size_t capacity, int count) {
+  ImuBuffer buffer(capacity);
+  for (int i = 0; i < count; ++i) {
+    buffer.push({i * 10'000'000LL, {0.01 * i, 0.0, 0.0}, {0.0, 0.0, 9.81}});
+  }
+  return buffer;
+}
+
+double integral(const ImuBuffer& buffer, TimeNs from, TimeNs to) {
+  double sum = 0.0;
+  double duration = 0.0;
+  buffer.for_each_piece(from, to, [&](const Eigen::Vector3d& gyro, const Eigen::Vector3d&, double dt) {
+    sum += gyro.x() * dt;
+    duration += dt;
+  });
+  CHECK(duration == doctest::Approx(seconds_between(from, to)));
+  return sum;
+}
+
+}  // namespace
+
+TEST_CASE("imu buffer: pieces add up to the integral, from and to anywhere") {
+  const ImuBuffer buffer = ramp(100, 50);
+  CHECK(integral(buffer, 0, 100'000'000) == doctest::Approx(0.005));
+  CHECK(integral(buffer, 3'000'000, 27'000'000) == doctest::Approx(0.5 * (0.027 * 0.027 - 0.003 * 0.003)));
+  CHECK(integral(buffer, 12'000'000, 14'000'000) == doctest::Approx(0.5 * (0.014 * 0.014 - 0.012 * 0.012)));
+}
+
+TEST_CASE("imu buffer: the newest sample is held beyond the end") {
+  const ImuBuffer buffer = ramp(100, 11);  // ends at 0.1 s with 0.1 rad/s
+  CHECK(integral(buffer, 100'000'000, 110'000'000) == doctest::Approx(0.001));
+}
+
+TEST_CASE("imu buffer: the oldest sample makes room") {
+  const ImuBuffer buffer = ramp(10, 25);
+  CHECK(buffer.size() == 10);
+  CHECK(buffer[0].t_ns == 150'000'000);
+  CHECK(buffer.newest().t_ns == 240'000'000);
+  CHECK(integral(buffer, 200'000'000, 220'000'000) == doctest::Approx(0.5 * (0.22 * 0.22 - 0.20 * 0.20)));
+}
+
+TEST_CASE("imu buffer: statistics of an interval") {
+  ImuBuffer buffer(20);
+  for (int i = 0; i < 20; ++i) {
+    const double sign = i % 2 == 0 ? 1.0 : -1.0;
+    buffer.push({i * 5'000'000LL, {1.0 + 0.02 * sign, 0.0, 0.0}, {0.0, 0.0, 9.81 + 0.5 * sign}});
+  }
+  const ImuStatistics s = buffer.statistics(10'000'000, 45'000'000);
+  CHECK(s.count == 8);
+  CHECK(s.duration == doctest::Approx(0.035));
+  CHECK(s.gyro_mean.x() == doctest::Approx(1.0));
+  CHECK(s.gyro_spread == doctest::Approx(0.02));
+  CHECK(s.accel_spread == doctest::Approx(0.5));
+}

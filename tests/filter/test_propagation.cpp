@@ -1,0 +1,131 @@
+#include <doctest/doctest.h>
+
+#include <random>
+
+#include "filter/propagation.h"
+#include "tests/support/check_jacobian.h"
+#include "tests/support/random_state.h"
+
+using namespace ear;
+using namespace ear::test;
+
+namespace {
+
+Eigen::VectorXd imu_difference(const ImuState& truth, const ImuState& estimate) {
+  State a, b;
+  a.imu = truth;
+  b.imu = estimate;
+  return boxminus(a, b).head<err::imu_size>();
+}
+
+ImuState disturbed(const ImuState& x, const Eigen::VectorXd& d) {
+  State state;
+  state.imu = x;
+  Eigen::VectorXd full = Eigen::VectorXd::Zero(err::clones);
+  full.head<err::imu_size>() = d;
+  return boxplus(state, full).imu;
+}
+
+}  // namespace
+
+TEST_CASE("propagation: free fall, and standing still") {
+  ImuState x;
+  x.v_W = {1.0, 0.0, 2.0};
+  const ImuState fallen = integrate(x, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(), 0.5);
+  CHECK((fallen.v_W - Eigen::Vector3d(1.0, 0.0, 2.0 - 9.81 * 0.5)).norm() < 1e-12);
+  CHECK((fallen.p_WB - Eigen::Vector3d(0.5, 0.0, 1.0 - 0.5 * 9.81 * 0.25)).norm() < 1e-12);
+  CHECK(fallen.t_ns == 500'000'000);
+  const ImuState stood = integrate(ImuState{}, Eigen::Vector3d::Zero(), -kGravity_W, 1.0);
+  CHECK(stood.v_W.norm() < 1e-12);
+}
+
+TEST_CASE("propagation: a circle at constant speed, one step at a time and in one") {
+  // Left turn: rate about z, force towards the centre on the left (y), plus gravity.
+  ImuState x;
+  x.v_W = {2.0, 0.0, 0.0};
+  const Eigen::Vector3d rate{0.0, 0.0, 0.5};
+  const Eigen::Vector3d force{0.0, 2.0 * 0.5, 9.81};
+  ImuState steps = x;
+  for (int i = 0; i < 200; ++i) steps = integrate(steps, rate, force, 0.005);
+  const ImuState once = integrate(x, rate, force, 1.0);
+  const Eigen::Vector3d expected{4.0 * std::sin(0.5), 4.0 * (1.0 - std::cos(0.5)), 0.0};  // radius 4 m
+  CHECK((steps.p_WB - expected).norm() < 1e-9);
+  CHECK((once.p_WB - expected).norm() < 1e-9);
+  CHECK(once.v_W.y() > 0.0);
+}
+
+TEST_CASE("propagation: Phi is the derivative, biases included") {
+  std::mt19937_64 rng{11};
+  for (int trial = 0; trial < 20; ++trial) {
+    CAPTURE(trial);
+    const ImuState x = random_state(rng, 0).imu;
+    const Eigen::Vector3d gyro = random_vector(rng, 1.0);
+    const Eigen::Vector3d accel = random_vector(rng, 5.0) - kGravity_W;
+    const double dt = 0.01;
+    const ImuState next = integrate(x, gyro, accel, dt);
+    const ErrorTransition step = error_transition(x, gyro, accel, dt, ImuCalibration{});
+    check_jacobian(
+        [&](const Eigen::VectorXd& d) -> Eigen::VectorXd {
+          return imu_difference(integrate(disturbed(x, d), gyro, accel, dt), next);
+        },
+        step.Phi);
+  }
+}
+
+TEST_CASE("propagation: Q is the covariance of many noisy integrations") {
+  std::mt19937_64 rng{12};
+  std::normal_distribution<double> normal;
+  ImuCalibration noise;
+  noise.gyro_noise = 0.01;
+  noise.accel_noise = 0.1;
+  noise.gyro_random_walk = 0.01;
+  noise.accel_random_walk = 0.1;
+  const ImuState start = random_state(rng, 0).imu;
+  const double dt = 0.01;
+  constexpr int kSteps = 20;
+  std::vector<Eigen::Vector3d> gyro, accel;
+  for (int i = 0; i < kSteps; ++i) {
+    gyro.push_back(random_vector(rng, 1.0));
+    accel.push_back(random_vector(rng, 3.0) - kGravity_W);
+  }
+  ErrorTransition total;
+  ImuState mean = start;
+  for (int i = 0; i < kSteps; ++i) {
+    const auto s = static_cast<std::size_t>(i);
+    chain(total, error_transition(mean, gyro[s], accel[s], dt, noise));
+    mean = integrate(mean, gyro[s], accel[s], dt);
+  }
+  constexpr int kRuns = 4000;
+  ImuErrorMatrix sampled = ImuErrorMatrix::Zero();
+  for (int run = 0; run < kRuns; ++run) {
+    // The truth follows the true rates; its sensors add white noise to their means over dt, and its biases walk.
+    ImuState truth = start;
+    for (int i = 0; i < kSteps; ++i) {
+      const auto s = static_cast<std::size_t>(i);
+      const Eigen::Vector3d n_g = random_vector(rng, noise.gyro_noise / std::sqrt(dt));
+      const Eigen::Vector3d n_a = random_vector(rng, noise.accel_noise / std::sqrt(dt));
+      truth = integrate(truth, gyro[s] - n_g, accel[s] - n_a, dt);
+      truth.b_g += random_vector(rng, noise.gyro_random_walk * std::sqrt(dt));
+      truth.b_a += random_vector(rng, noise.accel_random_walk * std::sqrt(dt));
+    }
+    const Eigen::VectorXd e = imu_difference(truth, mean);
+    sampled += e * e.transpose() / kRuns;
+  }
+  // Whitened by Q the sample covariance is the identity, each entry to within its own sampling error of 1 / sqrt(runs).
+  const Eigen::LLT<ImuErrorMatrix> llt(total.Q);
+  REQUIRE(llt.info() == Eigen::Success);
+  const ImuErrorMatrix half = llt.matrixL().solve(sampled);
+  const ImuErrorMatrix white = llt.matrixL().solve(half.transpose());
+  CHECK((white - ImuErrorMatrix::Identity()).cwiseAbs().maxCoeff() < 5.0 * std::sqrt(2.0 / kRuns));
+}
+
+TEST_CASE("propagation: yaw and position stay unobservable whatever the state") {
+  // A common turn about gravity and a common shift go through unchanged: Phi keeps them where they are.
+  std::mt19937_64 rng{13};
+  const ErrorTransition step = error_transition(random_state(rng, 0).imu, random_vector(rng, 1.0),
+                                                random_vector(rng, 9.0), 0.01, ImuCalibration{});
+  Eigen::Matrix<double, err::imu_size, 4> N = Eigen::Matrix<double, err::imu_size, 4>::Zero();
+  N.block<3, 1>(err::theta, 0) = Eigen::Vector3d::UnitZ();
+  N.block<3, 3>(err::rho, 1).setIdentity();
+  CHECK((step.Phi * N - N).norm() < 1e-12);
+}
