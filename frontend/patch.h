@@ -33,16 +33,18 @@ class PatchLevel {
   [[nodiscard]] float corner_strength() const { return corner_strength_; }
 
   struct Step {
-    float correlation = -1.0F;  ///< zero-mean normalized correlation *before* the step, -1 to 1
-    float moved = 0.0F;         ///< [px of this level]
+    float correlation = -1.0F;                          ///< zero-mean normalized *before* the step, -1 to 1
+    Eigen::Vector2f moved = Eigen::Vector2f::Zero();    ///< of the centre [px of this level]
   };
 
-  /// One Gauss-Newton step of the position; nothing if the patch leaves the image or does not correlate with it.
-  [[nodiscard]] std::optional<Step> step_position(const GreyLevel& level, Warp& warp) const;
+  /// One Gauss-Newton step of the position, `scale` times as long; nothing if the patch leaves the image or does not
+  /// correlate with it.
+  [[nodiscard]] std::optional<Step> step_position(const GreyLevel& level, float scale, Warp& warp) const;
 
   /// One Gauss-Newton step of position and affine map. The map is held near `prior`, so that a patch which does
   /// not show some direction of it (an edge) keeps what is known.
-  [[nodiscard]] std::optional<Step> step_affine(const GreyLevel& level, const Eigen::Matrix2f& prior, Warp& warp) const;
+  [[nodiscard]] std::optional<Step> step_affine(const GreyLevel& level, const Eigen::Matrix2f& prior, float scale,
+                                                Warp& warp) const;
 
   /// Zero-mean normalized correlation of the patch with the image; nothing if it leaves the image.
   [[nodiscard]] std::optional<float> correlate(const GreyLevel& level, const Warp& warp) const;

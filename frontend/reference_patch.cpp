@@ -13,6 +13,7 @@ constexpr float kPositionSettled = 0.25F;
 constexpr int kAffineSteps = 6;
 constexpr float kAffineSettled = 0.015F;
 constexpr float kMaxUnsettled = 0.15F;  // [px] a last step this long is still a match: noise keeps weak patches moving
+constexpr float kMinScale = 0.3F;       // of steps that overshoot
 constexpr float kMaxStretch = 2.5F;  // of the affine map: beyond, the patch is no longer what it was
 
 Warp scaled(const Warp& warp, int level) { return {warp.centre / static_cast<float>(1 << level), warp.affine}; }
@@ -21,6 +22,25 @@ bool plausible(const Eigen::Matrix2f& affine) {
   const float area = affine.determinant();
   return area > 1.0F / (kMaxStretch * kMaxStretch) && area < kMaxStretch * kMaxStretch &&
          affine.cwiseAbs().maxCoeff() < kMaxStretch;
+}
+
+// Steps until one is shorter than `short_enough`, and returns the last. Where the image is sharper than the patch, steps
+// overshoot: each then undoes a part of the one before, which tells how much shorter they should be.
+template <class DoStep>
+std::optional<PatchLevel::Step> settle(int max_steps, float short_enough, DoStep&& do_step) {
+  float scale = 1.0F;
+  std::optional<PatchLevel::Step> last;
+  for (int i = 0; i < max_steps; ++i) {
+    const std::optional<PatchLevel::Step> step = do_step(scale);
+    if (!step) return std::nullopt;
+    if (last) {
+      const float ratio = step->moved.dot(last->moved) / last->moved.squaredNorm();
+      if (ratio < 0.0F) scale = std::max(scale / (1.0F - ratio), kMinScale);
+    }
+    last = step;
+    if (step->moved.squaredNorm() < short_enough * short_enough) break;
+  }
+  return last;
 }
 
 }  // namespace
@@ -47,31 +67,23 @@ std::optional<ReferencePatch::Match> ReferencePatch::align(const ImagePyramid& p
     const auto i = static_cast<std::size_t>(level);
     if (!usable_[i]) continue;
     Warp coarse = scaled(warp, level);
-    bool found = true;
-    for (int step = 0; step < kCoarseSteps && found; ++step) {
-      const auto done = levels_[i].step_position(pyramid.level(level), coarse);
-      found = done.has_value();
-      if (found && done->moved < kCoarseSettled) break;
-    }
-    if (found) warp.centre = coarse.centre * static_cast<float>(1 << level);
+    const auto settled = settle(kCoarseSteps, kCoarseSettled, [&](float scale) {
+      return levels_[i].step_position(pyramid.level(level), scale, coarse);
+    });
+    if (settled) warp.centre = coarse.centre * static_cast<float>(1 << level);
   }
 
   const PatchLevel& base = levels_.front();
   const GreyLevel& image = pyramid.level(0);
-  for (int step = 0; step < kPositionSteps; ++step) {
-    const auto done = base.step_position(image, warp);
-    if (!done) return std::nullopt;
-    if (done->moved < kPositionSettled) break;
-  }
-  PatchLevel::Step last;
-  for (int step = 0; step < kAffineSteps; ++step) {
-    const auto done = base.step_affine(image, start.affine, warp);
-    if (!done || !plausible(warp.affine)) return std::nullopt;
-    last = *done;
-    if (last.moved < kAffineSettled) break;
-  }
-  if (last.moved > kMaxUnsettled || last.correlation < kMinCorrelation) return std::nullopt;
-  return Match{warp, last.correlation};
+  const auto placed = settle(kPositionSteps, kPositionSettled,
+                             [&](float scale) { return base.step_position(image, scale, warp); });
+  if (!placed) return std::nullopt;
+  const auto settled = settle(kAffineSteps, kAffineSettled, [&](float scale) {
+    return base.step_affine(image, start.affine, scale, warp);
+  });
+  if (!settled || !plausible(warp.affine)) return std::nullopt;
+  if (settled->moved.norm() > kMaxUnsettled || settled->correlation < kMinCorrelation) return std::nullopt;
+  return Match{warp, settled->correlation};
 }
 
 }  // namespace ear
