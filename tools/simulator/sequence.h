@@ -1,0 +1,41 @@
+// What the vehicle does and where: a table of legs per sequence. A new sequence is a new entry in sequence.cpp.
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "tools/simulator/random.h"
+#include "tools/simulator/terrain.h"
+
+namespace ear::simulator {
+
+/// A piece of the plan with constant commands; the motion smooths the corners between legs (motion_plan.h).
+struct Leg {
+  double duration = 0.0;  ///< [s]
+  double forward = 0.0;   ///< distance along the heading [m]
+  double lateral = 0.0;   ///< distance to the left [m], in the air only
+  double turn = 0.0;      ///< change of heading, left positive [rad]
+  double climb = 0.0;     ///< change of height above the ground [m]; the leg that comes back to 0 ends with a strike
+  double swing = 0.0;     ///< amplitude of the body's swing about the axle [rad]
+};
+
+struct Sequence {
+  std::string name;
+  std::string summary;  ///< one line for people
+  Terrain terrain;
+  Eigen::Vector2d start = Eigen::Vector2d::Zero();  ///< middle of the axle [m]
+  double heading = 0.0;                             ///< at the start [rad]
+  std::vector<Leg> legs;
+};
+
+/// The names that `find_sequence` knows.
+[[nodiscard]] std::vector<std::string> sequence_names();
+
+/// Throws std::invalid_argument, naming those that exist, if there is none of that name.
+[[nodiscard]] Sequence find_sequence(const std::string& name);
+
+/// The same plan as another day would have it: start, speeds and lengths differ by a few per cent.
+[[nodiscard]] Sequence vary(Sequence sequence, Rng& rng);
+
+}  // namespace ear::simulator

@@ -1,0 +1,96 @@
+// One simulated drive or flight in memory: truth, calibration, samples of all sensors and feature tracks.
+//
+//   const ear::simulator::Simulation simulation({"flat1", 7});
+//   for (std::size_t i = 0; i < simulation.frame_times().size(); ++i) use(simulation.tracks(i));
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "ear/calibration.h"
+#include "ear/types.h"
+#include "tools/simulator/motion_plan.h"
+#include "tools/simulator/scene.h"
+#include "tools/simulator/sensors.h"
+#include "tools/simulator/track_generator.h"
+#include "tools/simulator/wheel_motion.h"
+
+namespace ear::simulator {
+
+struct Options {
+  std::string sequence = "flat1";
+  std::uint64_t seed = 1;            ///< varies noise, biases, landmarks, calibration errors and details of the motion
+  bool perfect_calibration = false;  ///< calibration() is the true one; changes no sample
+  std::optional<double> duration;    ///< [s] stop earlier, or keep standing at the end for longer
+  double camera_rate_hz = 30.0;
+  LensModel lens = LensModel::radial_tangential;
+  bool sensor_noise = true;  ///< false: IMU without noise and biases, encoders and lasers without noise
+  bool tracks = true;        ///< false: no feature tracks, for recordings of images
+  TrackOptions track;
+};
+
+/// The truth at one instant. World W: z up, the origin in a corner of the room.
+struct Truth {
+  TimeNs t_ns = 0;
+  Eigen::Matrix3d R_WB = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d p_WB = Eigen::Vector3d::Zero();
+  Eigen::Vector3d v_W = Eigen::Vector3d::Zero();
+  Eigen::Vector3d omega_B = Eigen::Vector3d::Zero();  ///< [rad/s]
+  Eigen::Vector3d b_g = Eigen::Vector3d::Zero();      ///< [rad/s]
+  Eigen::Vector3d b_a = Eigen::Vector3d::Zero();      ///< [m/s^2]
+  Mode mode = Mode::ground;
+  Eigen::Vector3d n_W = Eigen::Vector3d::UnitZ();  ///< ground's normal below the axle's middle
+  double slope_along = 0.0;                        ///< of the ground along the heading, uphill positive [rad]
+  double slope_across = 0.0;                       ///< to the left of the heading, uphill positive [rad]
+  double axle_speed = 0.0;                         ///< forward speed of the axle's middle [m/s]
+  double slip = 0.0;                               ///< speed of the rims over the ground, mean of both wheels [m/s]
+};
+
+class Simulation {
+ public:
+  /// Throws std::invalid_argument for a sequence that does not exist or a duration or rate that is not positive.
+  explicit Simulation(const Options& options);
+
+  /// What the estimator is told; slightly wrong unless Options::perfect_calibration.
+  [[nodiscard]] const Calibration& calibration() const { return calibration_; }
+  [[nodiscard]] const Calibration& true_calibration() const { return true_calibration_; }
+
+  [[nodiscard]] Truth truth(TimeNs t_ns) const;
+  /// Distance that the body travels from the first to the last stamp [m].
+  [[nodiscard]] double path_length() const;
+
+  [[nodiscard]] const std::vector<ImuSample>& imu() const { return imu_; }
+  [[nodiscard]] const std::vector<EncoderSample>& encoders() const { return encoders_; }
+  [[nodiscard]] const std::vector<LaserSample>& lasers() const { return lasers_; }
+  /// Stamps of the stereo frames: the middle of their exposure.
+  [[nodiscard]] const std::vector<TimeNs>& frame_times() const { return frame_times_; }
+  /// Features of one frame. Throws std::out_of_range; without Options::tracks there are none.
+  [[nodiscard]] const FeatureFrame& tracks(std::size_t frame) const { return tracks_.at(frame); }
+
+  [[nodiscard]] const Scene& scene() const { return scene_; }
+  [[nodiscard]] const MotionPlan& plan() const { return plan_; }
+  [[nodiscard]] const Options& options() const { return options_; }
+
+ private:
+  Simulation(const Options& options, const Sequence& sequence);
+
+  Options options_;
+  Calibration true_calibration_;
+  Calibration calibration_;
+  Scene scene_;
+  MotionPlan plan_;
+  WheelMotion wheels_;
+  double duration_;
+  std::vector<ImuSample> imu_;
+  std::vector<ImuBias> biases_;  // at the stamps of imu_
+  std::vector<EncoderSample> encoders_;
+  std::vector<LaserSample> lasers_;
+  std::vector<TimeNs> frame_times_;
+  std::vector<FeatureFrame> tracks_;
+};
+
+}  // namespace ear::simulator

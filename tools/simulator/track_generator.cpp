@@ -1,0 +1,117 @@
+#include "tools/simulator/track_generator.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+#include "tools/simulator/lens.h"
+#include "tools/simulator/sensors.h"
+
+namespace ear::simulator {
+namespace {
+
+constexpr double kCell = 40.0;    // [px] one feature per cell is drawn before any cell gets its second
+constexpr double kMargin = 3.0;   // [px] front ends keep away from the border
+constexpr double kFarthest = 30;  // [m]
+
+struct Landmark {
+  std::uint64_t id;
+  Eigen::Vector3d p_W;
+  Eigen::Vector2d pixel;  // in the left picture
+};
+
+Eigen::Isometry3d pose_of(const Kinematics& motion, const CameraCalibration& camera) {
+  Eigen::Isometry3d T_WB = Eigen::Isometry3d::Identity();
+  T_WB.linear() = motion.R_WB;
+  T_WB.translation() = motion.p_WB;
+  return T_WB * camera.T_BC;
+}
+
+// Where a camera sees a point, if it does.
+std::optional<Eigen::Vector2d> see(const Scene& scene, const CameraCalibration& camera, const Eigen::Isometry3d& T_WC,
+                                   const Eigen::Vector3d& p_W) {
+  const Eigen::Vector3d p_C = T_WC.linear().transpose() * (p_W - T_WC.translation());
+  const auto pixel = project(camera, p_C, kMargin);
+  return pixel && scene.sees(T_WC.translation(), p_W) ? pixel : std::nullopt;
+}
+
+Eigen::Vector2d measure(const CameraCalibration& camera, const Eigen::Vector2d& pixel, double sigma_px, Rng& rng) {
+  const double du = normal(rng, sigma_px);
+  const double dv = normal(rng, sigma_px);
+  return to_ray(camera, pixel + Eigen::Vector2d(du, dv));
+}
+
+// Fills empty cells of the grid, in random order, with points on whatever the camera sees there.
+void replenish(std::vector<Landmark>& landmarks, std::uint64_t& next_id, const Scene& scene,
+               const CameraCalibration& camera, const Eigen::Isometry3d& T_WC, int max_features, Rng& rng) {
+  const int columns = static_cast<int>(std::ceil(camera.width / kCell));
+  const int rows = static_cast<int>(std::ceil(camera.height / kCell));
+  std::vector<char> taken(static_cast<std::size_t>(columns * rows), 0);
+  const auto cell_of = [&](const Eigen::Vector2d& pixel) {
+    return static_cast<std::size_t>(static_cast<int>(pixel.y() / kCell) * columns +
+                                    static_cast<int>(pixel.x() / kCell));
+  };
+  for (const Landmark& landmark : landmarks) taken[cell_of(landmark.pixel)] = 1;
+  std::vector<std::size_t> empty;
+  for (std::size_t i = 0; i < taken.size(); ++i) {
+    if (!taken[i]) empty.push_back(i);
+  }
+  std::shuffle(empty.begin(), empty.end(), rng);
+  for (const std::size_t cell : empty) {
+    if (landmarks.size() >= static_cast<std::size_t>(max_features)) return;
+    const double u = kCell * (static_cast<double>(cell % static_cast<std::size_t>(columns)) + uniform(rng, 0.0, 1.0));
+    const double v = kCell * (static_cast<double>(cell / static_cast<std::size_t>(columns)) + uniform(rng, 0.0, 1.0));
+    const Eigen::Vector3d direction_W = T_WC.linear() * to_ray(camera, {u, v}).homogeneous().normalized();
+    const auto hit = scene.cast(T_WC.translation(), direction_W);
+    if (!hit || hit->range > kFarthest) continue;
+    const Eigen::Vector3d p_W = T_WC.translation() + hit->range * direction_W;
+    const auto pixel = see(scene, camera, T_WC, p_W);
+    if (pixel) landmarks.push_back({next_id++, p_W, *pixel});
+  }
+}
+
+}  // namespace
+
+std::vector<FeatureFrame> generate_tracks(const Scene& scene, const Trajectory& trajectory,
+                                          const std::vector<CameraCalibration>& cameras,
+                                          const std::vector<TimeNs>& stamps, const TrackOptions& options, Rng& rng) {
+  const CameraCalibration& left = cameras.front();
+  std::vector<FeatureFrame> frames;
+  frames.reserve(stamps.size());
+  std::vector<Landmark> landmarks;
+  std::uint64_t next_id = 1;
+  TimeNs previous_ns = stamps.empty() ? 0 : stamps.front();
+  for (const TimeNs t_ns : stamps) {
+    const Kinematics motion = trajectory.at(motion_time(t_ns));
+    const Eigen::Isometry3d T_WC0 = pose_of(motion, left);
+
+    const double loss = 1.0 - std::exp(-seconds_between(previous_ns, t_ns) / options.mean_life);
+    previous_ns = t_ns;
+    std::vector<Landmark> kept;
+    for (const Landmark& landmark : landmarks) {
+      if (uniform(rng, 0.0, 1.0) < loss) continue;
+      if (const auto pixel = see(scene, left, T_WC0, landmark.p_W)) kept.push_back({landmark.id, landmark.p_W, *pixel});
+    }
+    landmarks = std::move(kept);
+    replenish(landmarks, next_id, scene, left, T_WC0, options.max_features, rng);
+
+    FeatureFrame frame{t_ns, {}};
+    frame.features.reserve(landmarks.size());
+    for (const Landmark& landmark : landmarks) {
+      FeatureObservation seen;
+      seen.id = landmark.id;
+      seen.left = measure(left, landmark.pixel, options.sigma_px, rng);
+      if (cameras.size() > 1) {
+        if (const auto pixel = see(scene, cameras[1], pose_of(motion, cameras[1]), landmark.p_W)) {
+          seen.right = measure(cameras[1], *pixel, options.sigma_px, rng);
+          seen.has_right = true;
+        }
+      }
+      frame.features.push_back(seen);
+    }
+    frames.push_back(std::move(frame));
+  }
+  return frames;
+}
+
+}  // namespace ear::simulator
