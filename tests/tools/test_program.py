@@ -1,0 +1,80 @@
+"""The ear program from outside: what it says to a wrong command line, and the way from a simulation to a result.
+
+test_program.py EAR_PROGRAM [TEST...]
+"""
+
+import csv
+import json
+import subprocess
+import sys
+import tempfile
+import unittest
+from pathlib import Path
+
+PROGRAM = Path(sys.argv.pop(1)).resolve()
+
+
+def ear(*arguments, folder=None):
+    command = [str(PROGRAM), *map(str, arguments)]
+    return subprocess.run(command, cwd=folder, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
+
+
+class CommandLine(unittest.TestCase):
+    def assert_refused(self, result, message):
+        """An exit code of its own making (a signal's is negative), and the reason on the error stream."""
+        self.assertGreater(result.returncode, 0, result)
+        self.assertIn(message, result.stderr)
+
+    def test_help(self):
+        self.assertEqual(ear("--help").returncode, 0)
+        for subcommand in ("run", "simulate", "evaluate", "check", "bench"):
+            self.assertIn(subcommand, ear("--help").stdout)
+            self.assertEqual(ear(subcommand, "--help").returncode, 0)
+
+    def test_no_arguments(self):
+        self.assert_refused(ear(), "subcommand")
+
+    def test_unknown_subcommand(self):
+        self.assert_refused(ear("dance"), "dance")
+
+    def test_unknown_option(self):
+        self.assert_refused(ear("run", "recording", "--dance"), "--dance")
+
+    def test_missing_recording(self):
+        with tempfile.TemporaryDirectory() as folder:
+            missing = Path(folder) / "missing"
+            self.assert_refused(ear("run", missing, "--out", Path(folder) / "out"), str(missing))
+            self.assert_refused(ear("check", missing), str(missing))
+            self.assert_refused(ear("evaluate", missing, missing), str(missing))
+
+    def test_unknown_sequence(self):
+        with tempfile.TemporaryDirectory() as folder:
+            self.assert_refused(ear("simulate", "moon1", "--out", Path(folder) / "out"), "moon1")
+
+
+class EndToEnd(unittest.TestCase):
+    def run_ear(self, *arguments):
+        result = ear(*arguments)
+        self.assertEqual(result.returncode, 0, result)
+        return result.stdout
+
+    def test_from_simulation_to_report(self):
+        with tempfile.TemporaryDirectory() as folder:
+            recording, output, report = (Path(folder) / name for name in ("recording", "output", "report.html"))
+            self.run_ear("simulate", "flat1", "--seed", "5", "--duration", "6", "--out", recording)
+            self.run_ear("check", recording)
+            self.run_ear("run", recording, "--out", output)
+            figures = json.loads(self.run_ear("evaluate", output, recording, "--json", "--report", report))
+
+            with (output / "states.csv").open(encoding="utf-8") as states:
+                rows = list(csv.DictReader(states))
+            poses = (output / "estimate.tum").read_text(encoding="utf-8").splitlines()
+            self.assertGreater(len(rows), 60)
+            self.assertEqual(len(rows), sum(not pose.startswith("#") for pose in poses))
+            self.assertTrue(json.loads((output / "summary.json").read_text(encoding="utf-8")))
+            self.assertIn("<svg", report.read_text(encoding="utf-8"))
+            self.assertTrue(figures)
+
+
+if __name__ == "__main__":
+    unittest.main()
