@@ -64,14 +64,14 @@ void add_evaluate_command(CLI::App& app) {
   const auto arguments = std::make_shared<EvaluateArguments>();
   CLI::App* const command = app.add_subcommand("evaluate", "how far estimated trajectories are from the truth");
   command
-      ->add_option("paths", arguments->paths,
-                   "ESTIMATE... TRUTH: output folders of ear run, states.csv, TUM or EuRoC csv files; then the "
-                   "recording, EuRoC csv or TUM file with the truth")
+      ->add_option("ESTIMATE... TRUTH", arguments->paths,
+                   "output folders of ear run, states.csv, TUM or EuRoC csv files; then the truth: a recording, or a "
+                   "TUM or EuRoC csv file")
       ->required()
-      ->expected(2, 1000)
-      ->type_name("ESTIMATE... TRUTH");
+      ->expected(-2)  // two or more
+      ->option_text(" ");
   command->add_option("--align", arguments->kind, "what the worlds may differ in: se3, yaw (and translation), none")
-      ->transform(CLI::CheckedTransformer(kinds, CLI::ignore_case))
+      ->transform(CLI::CheckedTransformer(kinds, CLI::ignore_case).description(""))
       ->type_name("se3|yaw|none")
       ->default_str("yaw");
   command->add_flag("--json", arguments->json, "the figures as JSON instead of a table");

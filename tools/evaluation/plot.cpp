@@ -17,7 +17,8 @@ constexpr double kBottom = 10.0;
 constexpr double kBottomWithAxis = 40.0;
 constexpr double kStripHeight = 20.0;
 constexpr double kPixelStep = 0.7;             // between points of a path
-constexpr std::size_t kMostPathPoints = 4000;  // keeps the page small whatever the path
+constexpr std::size_t kMostPathPoints = 2500;  // keeps the page small whatever the path
+constexpr double kFineCurves = 3.0;            // so many are drawn to the pixel, more of them coarser
 constexpr double kTextWidth = 6.6;             // of one letter in a strip
 
 /// From data to pixels.
@@ -118,22 +119,20 @@ std::vector<Path> pieces(const std::vector<Eigen::Vector2d>& points, const Scale
   return result;
 }
 
-/// The first, lowest, highest and last point of every pixel column: no peak is lost.
-Path thinned_function(const Path& path) {
-  Path result;
-  for (std::size_t begin = 0; begin < path.size();) {
-    std::size_t end = begin + 1;
-    while (end < path.size() && std::floor(path[end].x()) == std::floor(path[begin].x())) ++end;
-    const auto [low, high] = std::minmax_element(
-        path.begin() + static_cast<std::ptrdiff_t>(begin), path.begin() + static_cast<std::ptrdiff_t>(end),
-        [](const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return a.y() < b.y(); });
-    std::vector<std::size_t> kept{begin, static_cast<std::size_t>(low - path.begin()),
-                                  static_cast<std::size_t>(high - path.begin()), end - 1};
-    std::sort(kept.begin(), kept.end());
-    kept.erase(std::unique(kept.begin(), kept.end()), kept.end());
-    for (const std::size_t i : kept) result.push_back(path[i]);
+/// The lowest and the highest point of every column of this width [px], and both ends: no peak is lost.
+Path thinned_function(const Path& path, double column) {
+  const auto lower = [](const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return a.y() < b.y(); };
+  Path result{path.front()};
+  for (auto begin = path.begin(); begin != path.end();) {
+    const double index = std::floor(begin->x() / column);
+    const auto end = std::find_if(
+        begin, path.end(), [&](const Eigen::Vector2d& point) { return std::floor(point.x() / column) != index; });
+    const auto [low, high] = std::minmax_element(begin, end, lower);
+    result.push_back(*std::min(low, high));
+    if (low != high) result.push_back(*std::max(low, high));
     begin = end;
   }
+  result.push_back(path.back());
   return result;
 }
 
@@ -149,6 +148,9 @@ Path thinned_path(const Path& path) {
   return result;
 }
 
+/// Many curves share the space that a page may take.
+double column_width(const Plot& plot) { return std::max(1.0, static_cast<double>(plot.curves.size()) / kFineCurves); }
+
 std::string coordinates(const Path& path) {
   std::string out;
   for (const Eigen::Vector2d& point : path) out += (out.empty() ? "" : " ") + px(point.x()) + "," + px(point.y());
@@ -159,12 +161,14 @@ std::string polyline(const Curve& curve, const Plot& plot, const Scale& s) {
   std::string out;
   for (const Path& path : pieces(curve.points, s))
     out += "<polyline" + attribute("class", "curve " + curve.css_class) + attribute("data-name", escaped(curve.name)) +
-           attribute("points", coordinates(plot.is_function ? thinned_function(path) : thinned_path(path))) + "/>";
+           attribute("points",
+                     coordinates(plot.is_function ? thinned_function(path, column_width(plot)) : thinned_path(path))) +
+           "/>";
   return out;
 }
 
 /// The band from -bound to +bound: along its upper edge and back along its lower one.
-std::string band(const Curve& curve, const Scale& s) {
+std::string band(const Curve& curve, const Plot& plot, const Scale& s) {
   if (curve.bound.empty()) return {};
   std::vector<Eigen::Vector2d> upper;
   for (std::size_t i = 0; i < curve.points.size(); ++i) {
@@ -173,7 +177,7 @@ std::string band(const Curve& curve, const Scale& s) {
   }
   std::string out;
   for (const Path& piece : pieces(upper, s)) {
-    const Path edge = thinned_function(piece);
+    const Path edge = thinned_function(piece, column_width(plot));
     Path outline = edge;
     for (auto point = edge.rbegin(); point != edge.rend(); ++point)
       outline.emplace_back(point->x(), 2.0 * s.y(0.0) - point->y());
@@ -259,7 +263,7 @@ std::string to_svg(const Plot& plot) {
     out += rectangle("shaded", s.left, top, s.right - s.left, std::min(s.bottom, s.y(plot.shaded->first)) - top);
   }
   out += axes(plot, s) + "<g" + attribute("clip-path", "url(#" + clip + ")") + ">";
-  for (const Curve& curve : plot.curves) out += band(curve, s);
+  for (const Curve& curve : plot.curves) out += band(curve, plot, s);
   for (const Curve& curve : plot.curves) out += polyline(curve, plot, s);
   if (!plot.is_function)
     for (const Curve& curve : plot.curves) out += ends_of_path(curve, s);

@@ -50,7 +50,7 @@ void make_equal(Plot& plot);
 /// Round numbers that divide a range into about `count` parts.
 [[nodiscard]] std::vector<double> ticks(const Range& range, int count);
 
-/// Curves are thinned to what the eye can see: about one pair of extremes per pixel column, or points 0.7 px apart.
+/// Curves are thinned to what the eye can see: the extremes of every pixel column, or points 0.7 px apart.
 [[nodiscard]] std::string to_svg(const Plot& plot);
 
 /// A strip as wide as the panels, `label` in the place of their y axis.

@@ -47,11 +47,12 @@ svg { display: block; width: 100%; height: auto; overflow: visible; }
 svg text { fill: var(--soft); font-size: 11.5px; }
 svg text.label { fill: var(--ink); font-size: 12.5px; }
 svg text.inside { fill: var(--ink); }
+svg.strip text.end { fill: var(--c); font-weight: 600; }
 .middle { text-anchor: middle; } .end { text-anchor: end; }
 .frame { fill: none; stroke: var(--rule); } .grid { stroke: var(--grid); } .grid.zero { stroke: var(--soft); opacity: 0.6; }
 .curve { fill: none; stroke: var(--c); stroke-width: 1.5; stroke-linejoin: round; }
 .curve.truth { stroke-width: 5; opacity: 0.22; stroke-linecap: round; }
-.band { fill: var(--c); opacity: 0.13; } .shaded { fill: var(--consistent); }
+.band { fill: var(--c); fill-opacity: 0.11; stroke: var(--c); stroke-opacity: 0.35; stroke-width: 0.8; } .shaded { fill: var(--consistent); }
 circle.start { fill: var(--card); stroke: var(--c); stroke-width: 2; } rect.end { fill: var(--c); }
 .cursor { stroke: var(--soft); stroke-dasharray: 3 3; visibility: hidden; }
 .s0 { fill: var(--s0); } .s1 { fill: var(--s1); } .s2 { fill: var(--s2); } .s3 { fill: var(--s3); }

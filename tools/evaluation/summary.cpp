@@ -154,7 +154,7 @@ std::vector<SummaryRow> summary_rows(const std::vector<Evaluation>& evaluations)
       make("z RMSE [m]", 4, true, [](const E& e) { return e.z_rmse; }),
       make("rotation RMSE [deg]", 3, true, [](const E& e) { return kDegPerRad * e.rotation_rmse; }),
       make("start-to-end error [m]", 4, true, [](const E& e) { return e.start_to_end.error; }),
-      make("| |end - start| - true | [m]", 4, true, [](const E& e) { return e.start_to_end.difference; }),
+      make("|end - start|, off by [m]", 4, true, [](const E& e) { return e.start_to_end.difference; }),
   };
   add_relative_rows(evaluations, rows);
   add_nees_rows(evaluations, rows);

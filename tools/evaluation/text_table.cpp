@@ -40,8 +40,17 @@ std::vector<std::string> split_at_blanks(std::string_view text) {
   return fields;
 }
 
-bool starts_a_row(std::string_view line) {
-  return !line.empty() && line.front() != '#' && std::isalpha(static_cast<unsigned char>(line.front())) == 0;
+std::vector<std::string> split(std::string_view text, bool at_commas) {
+  return at_commas ? split_at_commas(text) : split_at_blanks(text);
+}
+
+/// The whole text as a number, "nan" and "inf" included.
+std::optional<double> as_number(std::string_view text) {
+  if (!text.empty() && text.front() == '+') text.remove_prefix(1);
+  double value = 0.0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
+  return value;
 }
 
 struct Decimal {
@@ -95,22 +104,25 @@ TextTable::TextTable(std::filesystem::path path) : path_(std::move(path)) {
   std::ifstream file(path_);
   if (!file || std::filesystem::is_directory(path_)) throw std::runtime_error(path_.string() + ": cannot be read");
 
-  std::string header;
   std::string line;
   for (std::size_t number = 1; std::getline(file, line); ++number) {
     const std::string_view text = trimmed(line);
-    if (!starts_a_row(text)) {
-      if (rows_.empty() && !text.empty()) header = text;
-      // A word among the rows is no comment but damage: let the width or the number check name it.
-      if (rows_.empty() || text.empty() || text.front() == '#') continue;
+    if (text.empty()) continue;
+    const bool commas = text.find(',') != std::string_view::npos;
+    if (text.front() == '#') {
+      if (rows_.empty()) header_ = split(trimmed(text.substr(1)), commas);
+      continue;
     }
-    if (rows_.empty()) has_commas_ = text.find(',') != std::string_view::npos;
-    rows_.push_back({number, has_commas_ ? split_at_commas(text) : split_at_blanks(text)});
+    std::vector<std::string> fields = split(text, commas);
+    const bool has_numbers = std::any_of(fields.begin(), fields.end(), as_number);
+    if (rows_.empty() && !has_numbers) {
+      header_ = std::move(fields);
+      continue;
+    }
+    if (rows_.empty()) has_commas_ = commas;
+    rows_.push_back({number, std::move(fields)});
   }
   if (rows_.empty()) throw std::runtime_error(path_.string() + ": holds no rows of numbers");
-
-  header.erase(0, std::min(header.find_first_not_of("# "), header.size()));
-  header_ = has_commas_ ? split_at_commas(header) : split_at_blanks(header);
   check_widths();
 }
 
@@ -133,12 +145,10 @@ std::optional<std::size_t> TextTable::column(const std::string& name) const {
 
 double TextTable::number(const Row& row, std::size_t column, const std::string& name) const {
   const std::string& text = row.fields[column];
-  const char* const begin = text.data() + (text.rfind('+', 0) == 0 ? 1 : 0);
-  double value = 0.0;
-  const auto [end, error] = std::from_chars(begin, text.data() + text.size(), value);
-  if (error != std::errc{} || end != text.data() + text.size()) fail(row, column, name, "'" + text + "' is no number");
-  if (!std::isfinite(value)) fail(row, column, name, "'" + text + "' is not finite");
-  return value;
+  const std::optional<double> value = as_number(text);
+  if (!value) fail(row, column, name, "'" + text + "' is no number");
+  if (!std::isfinite(*value)) fail(row, column, name, "'" + text + "' is not finite");
+  return *value;
 }
 
 TimeNs TextTable::time(const Row& row, std::size_t column, const std::string& name, int exponent) const {

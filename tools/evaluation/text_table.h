@@ -17,8 +17,9 @@ struct Row {
   std::vector<std::string> fields;
 };
 
-/// The rows of a text file: fields separated by commas if the first row has one, else by blanks. Lines that start with
-/// '#' or a letter, and empty ones, are no rows; the last such line before the first row is the header.
+/// The rows of a text file: fields separated by commas where the line has one, else by blanks. Empty lines and those
+/// that start with '#' are no rows; nor is a line without any number before the first row. The last line before the
+/// first row that is no row is the header.
 class TextTable {
  public:
   /// Throws if the file cannot be read, has no rows, or has a row with another number of fields than the first.
