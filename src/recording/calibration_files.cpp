@@ -146,6 +146,13 @@ bool has_camchain(const std::vector<fs::path>& files) {
 
 bool has_sensor(const fs::path& mav0, const std::string& name) { return fs::is_directory(mav0 / name); }
 
+std::size_t count_cameras(const fs::path& mav0) {
+  const bool left = has_sensor(mav0, "cam0");
+  const bool right = has_sensor(mav0, "cam1");
+  if (right && !left) throw InputError(located(mav0 / "cam0", 0, "", "no such folder, although there is cam1"));
+  return left ? (right ? 2 : 1) : 0;
+}
+
 void read_cameras(const fs::path& mav0, Calibration& calibration) {
   for (const char* name : {"cam0", "cam1"}) {
     if (has_sensor(mav0, name)) calibration.cameras.push_back(read_camera(mav0 / name / "sensor.yaml"));
@@ -176,8 +183,8 @@ void express_in_imu_frame(const Eigen::Isometry3d& T_FB, Calibration& calibratio
 
 Calibration load_calibration(const fs::path& mav0, const std::vector<fs::path>& kalibr_files, Warnings& warnings) {
   Calibration calibration;
-  const bool kalibr_cameras = has_camchain(kalibr_files);
-  if (!kalibr_cameras) read_cameras(mav0, calibration);
+  const std::size_t cameras = count_cameras(mav0);
+  if (!has_camchain(kalibr_files)) read_cameras(mav0, calibration);
   if (has_sensor(mav0, "encoder0")) calibration.encoder = read_encoder(mav0 / "encoder0" / "sensor.yaml");
   if (has_sensor(mav0, "laser0")) calibration.lasers = read_lasers(mav0 / "laser0" / "sensor.yaml");
 
@@ -193,8 +200,7 @@ Calibration load_calibration(const fs::path& mav0, const std::vector<fs::path>& 
   // Kalibr's cameras are already relative to the IMU.
   for (const fs::path& file : kalibr_files) read_kalibr_file(file, calibration);
 
-  const std::size_t folders = has_sensor(mav0, "cam0") ? (has_sensor(mav0, "cam1") ? 2 : 1) : 0;
-  if (calibration.cameras.size() > folders) calibration.cameras.resize(folders);
+  calibration.cameras.resize(std::min(calibration.cameras.size(), cameras));
   return calibration;
 }
 

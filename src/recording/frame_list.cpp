@@ -1,7 +1,8 @@
 #include "src/recording/frame_list.h"
 
+#include <algorithm>
 #include <cmath>
-#include <cstdlib>
+#include <utility>
 
 namespace ear {
 namespace {
@@ -52,13 +53,15 @@ std::filesystem::path FrameList::matching_right(TimeNs t_ns, Warnings& warnings)
   return file;
 }
 
-// Time is cut into slots of one wanted period, and the first frame of each slot is used. The slots begin a quarter
-// period early, so that a frame whose stamp trembles around the border stays in its slot.
+// Time is cut into slots of one wanted period, and the frame nearest to the beginning of each slot is used: half an
+// interval before it is early enough, so that stamps may tremble.
 bool FrameList::due(TimeNs t_ns) {
   if (camera_rate_hz_ <= 0.0) return true;
   if (!first_ns_) first_ns_ = t_ns;
-  const auto slot = static_cast<std::int64_t>(std::floor(seconds_between(*first_ns_, t_ns) * camera_rate_hz_ + 0.25));
-  if (last_slot_ && slot == *last_slot_) return false;
+  const double interval = seconds_between(std::exchange(last_ns_, t_ns).value_or(t_ns), t_ns);
+  const double early = std::min(0.5 * interval * camera_rate_hz_, 0.5);  // in slots; 0.5 after a gap
+  const auto slot = static_cast<std::int64_t>(std::floor(seconds_between(*first_ns_, t_ns) * camera_rate_hz_ + early));
+  if (last_slot_ && slot <= *last_slot_) return false;
   last_slot_ = slot;
   return true;
 }

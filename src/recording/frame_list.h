@@ -40,6 +40,7 @@ class FrameList {
   std::optional<ImageRow> right_ahead_;
   double camera_rate_hz_;
   std::optional<TimeNs> first_ns_;
+  std::optional<TimeNs> last_ns_;
   std::optional<std::int64_t> last_slot_;
 };
 

@@ -1,7 +1,9 @@
 #include "src/recording/yaml_map.h"
 
 #include <Eigen/SVD>
+#include <algorithm>
 #include <fstream>
+#include <set>
 #include <sstream>
 #include <utility>
 
@@ -36,7 +38,9 @@ YamlMap YamlMap::load(const std::filesystem::path& file) {
   std::string text = read_text(file);
   if (text.rfind("%YAML:", 0) == 0) text[0] = '#';  // a comment keeps the numbers of the lines
   try {
-    return {file, YAML::Load(text), ""};
+    YAML::Node root = YAML::Load(text);
+    if (root.IsNull()) root = YAML::Node(YAML::NodeType::Map);  // an empty file says nothing
+    return {file, root, ""};
   } catch (const YAML::ParserException& problem) {
     const std::size_t line = problem.mark.is_null() ? 0 : static_cast<std::size_t>(problem.mark.line) + 1;
     throw InputError(located(file, line, "", "not valid YAML: " + problem.msg));
@@ -99,6 +103,17 @@ std::vector<YamlMap> YamlMap::children(const std::string& key) const {
     maps.emplace_back(file_, item, prefix_ + key + "[" + std::to_string(maps.size()) + "].");
   }
   return maps;
+}
+
+void YamlMap::require_only(const std::vector<std::string>& known) const {
+  std::set<std::string> seen;
+  for (const auto& entry : node_) {
+    const std::string& key = entry.first.Scalar();
+    if (!seen.insert(key).second) throw error_at(entry.first, key, "stated twice");
+    if (std::find(known.begin(), known.end(), key) == known.end()) {
+      throw error_at(entry.first, key, "there is no such setting");
+    }
+  }
 }
 
 InputError YamlMap::error(const std::string& key, const std::string& message) const {

@@ -53,13 +53,13 @@ class YamlMap {
   /// A list of maps below this one.
   [[nodiscard]] std::vector<YamlMap> children(const std::string& key) const;
 
+  /// Throws InputError at the first key that is none of `known`, or stated twice.
+  void require_only(const std::vector<std::string>& known) const;
+
   /// The error to throw about a key.
   [[nodiscard]] InputError error(const std::string& key, const std::string& message) const;
 
-  [[nodiscard]] const std::filesystem::path& file() const { return file_; }
-  [[nodiscard]] const YAML::Node& node() const { return node_; }
-
-  /// The value of a scalar found under `key`.
+ private:
   template <typename T>
   [[nodiscard]] T convert(const YAML::Node& value, const std::string& key) const {
     T result{};
@@ -72,7 +72,6 @@ class YamlMap {
     return result;
   }
 
- private:
   template <typename T>
   static const char* type_name() {
     if constexpr (std::is_same_v<T, bool>) return "true or false";

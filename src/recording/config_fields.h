@@ -1,0 +1,74 @@
+// The keys of a configuration file, stated once: loading, saving and the search for unknown keys all go through
+// visit(), so that they cannot drift apart. A new setting is one line here.
+//
+// visit(config, f) calls f(key, field) for every field; a field that is itself a struct of settings becomes a map.
+#pragma once
+
+#include <type_traits>
+
+#include "ear/config.h"
+
+namespace ear {
+
+/// C is T, or T and const.
+template <typename C, typename T>
+using EnableFor = std::enable_if_t<std::is_same_v<std::remove_const_t<C>, T>>;
+
+template <typename C, typename F>
+EnableFor<C, FrontendConfig> visit(C& c, F&& f) {
+  f("max_features", c.max_features);
+  f("nearest_depth", c.nearest_depth);
+}
+
+template <typename C, typename F>
+EnableFor<C, PriorConfig> visit(C& c, F&& f) {
+  f("gyro_bias", c.gyro_bias);
+  f("accel_bias", c.accel_bias);
+  f("camera_rotation", c.camera_rotation);
+  f("camera_position", c.camera_position);
+  f("stereo_rotation", c.stereo_rotation);
+  f("stereo_position", c.stereo_position);
+  f("time_offset", c.time_offset);
+}
+
+template <typename C, typename F>
+EnableFor<C, StandstillConfig> visit(C& c, F&& f) {
+  f("duration", c.duration);
+  f("max_gyro", c.max_gyro);
+  f("max_gyro_at_start", c.max_gyro_at_start);
+  f("max_gyro_spread", c.max_gyro_spread);
+  f("max_accel_spread", c.max_accel_spread);
+  f("max_flow_px", c.max_flow_px);
+  f("position_sigma", c.position_sigma);
+  f("rotation_sigma", c.rotation_sigma);
+  f("velocity_sigma", c.velocity_sigma);
+}
+
+template <typename C, typename F>
+EnableFor<C, OnlineCalibrationConfig> visit(C& c, F&& f) {
+  f("camera_extrinsics", c.camera_extrinsics);
+  f("time_offset", c.time_offset);
+  f("min_rate", c.min_rate);
+}
+
+template <typename C, typename F>
+EnableFor<C, FilterConfig> visit(C& c, F&& f) {
+  f("window", c.window);
+  f("max_track_updates", c.max_track_updates);
+  f("feature_sigma_px", c.feature_sigma_px);
+  f("huber_px", c.huber_px);
+  f("gate_probability", c.gate_probability);
+  f("keyframe_parallax_px", c.keyframe_parallax_px);
+  f("max_imu_gap", c.max_imu_gap);
+  f("prior", c.prior);
+  f("standstill", c.standstill);
+  f("online_calibration", c.online_calibration);
+}
+
+template <typename C, typename F>
+EnableFor<C, Config> visit(C& c, F&& f) {
+  f("frontend", c.frontend);
+  f("filter", c.filter);
+}
+
+}  // namespace ear

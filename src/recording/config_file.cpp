@@ -1,0 +1,65 @@
+#include "src/recording/config_file.h"
+
+#include <yaml-cpp/yaml.h>
+
+#include <fstream>
+#include <limits>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include "src/recording/config_fields.h"
+#include "src/recording/input_error.h"
+#include "src/recording/yaml_map.h"
+
+namespace ear {
+namespace {
+
+template <typename T>
+void load(const YamlMap& map, T& settings) {
+  std::vector<std::string> known;
+  visit(settings, [&](const char* key, auto& field) {
+    known.emplace_back(key);
+    if (!map.has(key)) return;
+    using Field = std::decay_t<decltype(field)>;
+    if constexpr (std::is_arithmetic_v<Field>) {
+      field = map.get<Field>(key);
+    } else {
+      load(map.child(key), field);
+    }
+  });
+  map.require_only(known);
+}
+
+template <typename T>
+void save(const T& settings, YAML::Emitter& out) {
+  out << YAML::BeginMap;
+  visit(settings, [&](const char* key, const auto& field) {
+    out << YAML::Key << key << YAML::Value;
+    if constexpr (std::is_arithmetic_v<std::decay_t<decltype(field)>>) {
+      out << field;
+    } else {
+      save(field, out);
+    }
+  });
+  out << YAML::EndMap;
+}
+
+}  // namespace
+
+Config load_config(const std::filesystem::path& file) {
+  Config config;
+  load(YamlMap::load(file), config);
+  return config;
+}
+
+void save_config(const Config& config, const std::filesystem::path& file) {
+  YAML::Emitter out;
+  out.SetDoublePrecision(std::numeric_limits<double>::max_digits10);
+  save(config, out);
+  std::ofstream stream(file);
+  stream << out.c_str() << '\n';
+  if (!stream.flush()) throw InputError(located(file, 0, "", "cannot be written"));
+}
+
+}  // namespace ear

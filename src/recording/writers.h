@@ -1,0 +1,64 @@
+// Results to files: estimate.tum, states.csv, summary.json. docs/recordings.md lists their fields.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "ear/odometry.h"
+#include "src/recording/warnings.h"
+
+namespace ear {
+
+/// A text file that is written line by line and says so when it cannot be (a full disk, for example).
+class OutputFile {
+ public:
+  /// Throws InputError if the file cannot be created.
+  explicit OutputFile(const std::filesystem::path& file);
+
+  /// Appends text. Throws InputError if that fails.
+  void write(const std::string& text);
+
+ private:
+  std::filesystem::path file_;
+  std::ofstream stream_;
+};
+
+/// The trajectory of the body as TUM's tools and evo read it: t [s] x y z [m] qx qy qz qw, one line per estimate.
+class TumWriter {
+ public:
+  explicit TumWriter(const std::filesystem::path& file) : out_(file) {}
+  void write(const NavState& state);
+  void write(const Estimate& estimate) { write(estimate.state); }
+
+ private:
+  OutputFile out_;
+};
+
+/// State, covariance and status of every frame, with a heading that names the columns.
+class StatesWriter {
+ public:
+  explicit StatesWriter(const std::filesystem::path& file);
+  void write(const Estimate& estimate);
+
+ private:
+  OutputFile out_;
+};
+
+/// What a run read, did and took.
+struct RunSummary {
+  std::string recording;
+  std::vector<std::pair<std::string, std::uint64_t>> counts;  ///< "frames", "estimates", "imu_gaps", ...
+  double duration_s = 0.0;                                    ///< length of the recording [s]
+  double wall_time_s = 0.0;                                   ///< time that the run took [s]
+  std::vector<std::pair<std::string, double>> stage_times_s;  ///< whole run, per stage [s]
+  std::vector<Warning> warnings;
+};
+
+/// Writes summary.json. Throws InputError if that fails.
+void write_summary(const RunSummary& summary, const std::filesystem::path& file);
+
+}  // namespace ear

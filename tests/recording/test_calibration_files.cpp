@@ -1,0 +1,247 @@
+#include <doctest/doctest.h>
+
+#include "src/recording/calibration_files.h"
+#include "tests/recording/support.h"
+
+using namespace ear;
+using namespace ear::test;
+
+namespace {
+
+Calibration load(const fs::path& mav0, const std::vector<fs::path>& files = {}) {
+  Warnings warnings;
+  return load_calibration(mav0, files, warnings);
+}
+
+// Replaces a part of a file's text, which must be there.
+void replace_in(const fs::path& file, const std::string& old_part, const std::string& new_part) {
+  std::string text = read_text(file);
+  const std::size_t at = text.find(old_part);
+  REQUIRE(at != std::string::npos);
+  write_text(file, text.replace(at, old_part.size(), new_part));
+}
+
+const std::string kCamchain =
+    "cam0:\n"
+    "  T_cam_imu:\n"
+    "  - [0.0, -1.0, 0.0, 0.05]\n"
+    "  - [0.0, 0.0, -1.0, 0.0]\n"
+    "  - [1.0, 0.0, 0.0, -0.1]\n"
+    "  - [0.0, 0.0, 0.0, 1.0]\n"
+    "  cam_overlaps: [1]\n"
+    "  camera_model: pinhole\n"
+    "  distortion_coeffs: [0.1, 0.2, 0.3, 0.4]\n"
+    "  distortion_model: equidistant\n"
+    "  intrinsics: [10.5, 10.25, 8.0, 6.0]\n"
+    "  resolution: [16, 12]\n"
+    "  rostopic: /cam0/image_raw\n"
+    "  timeshift_cam_imu: -0.0125\n"
+    "cam1:\n"
+    "  T_cn_cnm1:\n"
+    "  - [1.0, 0.0, 0.0, -0.1]\n"
+    "  - [0.0, 1.0, 0.0, 0.0]\n"
+    "  - [0.0, 0.0, 1.0, 0.0]\n"
+    "  - [0.0, 0.0, 0.0, 1.0]\n"
+    "  camera_model: pinhole\n"
+    "  distortion_coeffs: [0.0, 0.0, 0.0, 0.0]\n"
+    "  distortion_model: radtan\n"
+    "  intrinsics: [10.5, 10.25, 8.0, 6.0]\n"
+    "  resolution: [16, 12]\n";
+
+const std::string kKalibrImu =
+    "rostopic: /imu0\nupdate_rate: 250.0\naccelerometer_noise_density: 0.02\naccelerometer_random_walk: 0.003\n"
+    "gyroscope_noise_density: 0.004\ngyroscope_random_walk: 0.00005\n";
+
+}  // namespace
+
+TEST_CASE("calibration: all keys of sensor.yaml") {
+  const TempFolder folder;
+  write_full_recording(folder.path());
+  const Calibration c = load(folder.path());
+
+  REQUIRE(c.cameras.size() == 2);
+  CHECK(c.cameras[0].T_BC.translation() == Eigen::Vector3d(0.1, 0.05, 0.0));
+  CHECK((c.cameras[0].T_BC.linear() * Eigen::Vector3d::UnitZ()).isApprox(Eigen::Vector3d::UnitX()));
+  CHECK(c.cameras[0].width == 16);
+  CHECK(c.cameras[0].height == 12);
+  CHECK(c.cameras[0].fu == 10.5);
+  CHECK(c.cameras[0].fv == 10.25);
+  CHECK(c.cameras[0].cu == 8.0);
+  CHECK(c.cameras[0].cv == 6.0);
+  CHECK(c.cameras[0].distortion == std::array<double, 4>{0.1, 0.2, 0.3, 0.4});
+  CHECK(c.cameras[0].rate_hz == 10.0);
+  CHECK(c.imu.rate_hz == 100.0);
+  CHECK(c.imu.gyro_noise == 0.001);
+  CHECK(c.imu.gyro_random_walk == 0.00002);
+  CHECK(c.imu.accel_noise == 0.01);
+  CHECK(c.imu.accel_random_walk == 0.0003);
+  REQUIRE(c.encoder);
+  CHECK(c.encoder->T_BO.translation().z() == -0.05);
+  CHECK(c.encoder->resolution == 4096);
+  CHECK(c.encoder->wraps);
+  CHECK(c.encoder->wheel_radius == std::array<double, 2>{0.075, 0.076});
+  CHECK(c.encoder->wheel_separation == 0.4);
+  CHECK(c.encoder->noise_counts == 2.0);
+  REQUIRE(c.lasers);
+  REQUIRE(c.lasers->beams.size() == 3);
+  CHECK(c.lasers->beams[1].name == "front_right");
+  CHECK(c.lasers->beams[1].p_BL == Eigen::Vector3d(0.1, -0.1, 0.0));
+  CHECK(c.lasers->beams[1].d_B == -Eigen::Vector3d::UnitZ());
+  CHECK(c.lasers->range_max == 4.0);
+  CHECK(c.lasers->noise == 0.004);
+  CHECK(check_calibration(c).empty());
+}
+
+TEST_CASE("calibration: names of lens models") {
+  const TempFolder folder;
+  write_full_recording(folder.path());
+  const auto lens = [&](const std::string& name) {
+    write_text(folder / "cam0/sensor.yaml", camera_yaml("0.05", name));
+    return load(folder.path()).cameras.at(0);
+  };
+  for (const char* name : {"radial-tangential", "radtan", "plumb_bob"}) {
+    CHECK(lens(name).lens == LensModel::radial_tangential);
+  }
+  for (const char* name : {"equidistant", "kannala_brandt4"}) CHECK(lens(name).lens == LensModel::equidistant);
+  CHECK(lens("none").distortion == std::array<double, 4>{});
+  const std::string error = input_error_of([&] { lens("fov"); });
+  CHECK(contains(error, "cam0/sensor.yaml:15: distortion_model: 'fov' is not known"));
+}
+
+TEST_CASE("calibration: a fifth coefficient must be zero") {
+  const TempFolder folder;
+  write_full_recording(folder.path());
+  const fs::path file = folder / "cam0/sensor.yaml";
+  replace_in(file, "0.4]", "0.4, 0.0]");
+  CHECK(load(folder.path()).cameras[0].distortion[3] == 0.4);
+  replace_in(file, "0.4, 0.0]", "0.4, 0.5]");
+  CHECK(contains(input_error_of([&] { load(folder.path()); }), "distortion_coefficients: more than four"));
+}
+
+TEST_CASE("calibration: errors name file, line and key") {
+  const TempFolder folder;
+  write_full_recording(folder.path());
+  const auto error = [&] { return input_error_of([&] { load(folder.path()); }); };
+  const fs::path camera = folder / "cam0/sensor.yaml";
+
+  SUBCASE("a key is missing") {
+    replace_in(camera, "intrinsics:", "intrinsic:");
+    CHECK(contains(error(), "cam0/sensor.yaml:"));
+    CHECK(contains(error(), "intrinsics: missing"));
+  }
+  SUBCASE("a number is none") {
+    replace_in(camera, "10.25", "wide");
+    CHECK(contains(error(), "cam0/sensor.yaml:14: intrinsics: 'wide' is not a number"));
+  }
+  SUBCASE("a number is not finite") {
+    replace_in(camera, "10.25", ".nan");
+    CHECK(contains(error(), "cam0/sensor.yaml:14: intrinsics: '.nan' is not a finite number"));
+  }
+  SUBCASE("too few numbers") {
+    replace_in(camera, "16, 12", "16");
+    CHECK(contains(error(), "cam0/sensor.yaml:12: resolution: 1 numbers, not 2"));
+  }
+  SUBCASE("a pose is no 4x4 matrix") {
+    replace_in(camera, "0, 0, 0, 1]", "0, 0, 1]");
+    CHECK(contains(error(), "cam0/sensor.yaml:7: T_BS: 15 numbers, not 16"));
+  }
+  SUBCASE("a model that is not known") {
+    replace_in(camera, "pinhole", "omni");
+    CHECK(contains(error(), "cam0/sensor.yaml:13: camera_model: 'omni' is not known"));
+  }
+  SUBCASE("not YAML") {
+    write_text(camera, "T_BS: [1, 2\nrate_hz: 20\n");
+    CHECK(contains(error(), "cam0/sensor.yaml:"));
+    CHECK(contains(error(), "not valid YAML"));
+  }
+  SUBCASE("empty") {
+    write_text(camera, "");
+    CHECK(contains(error(), "cam0/sensor.yaml"));
+  }
+  SUBCASE("a beam") {
+    replace_in(folder / "laser0/sensor.yaml", "origin: [0.1, -0.1, 0]", "origin: [0.1, -0.1]");
+    CHECK(contains(error(), "laser0/sensor.yaml:5: beams[1].origin: 2 numbers, not 3"));
+  }
+  SUBCASE("an encoder's resolution is no whole number") {
+    replace_in(folder / "encoder0/sensor.yaml", "4096", "40.96");
+    CHECK(contains(error(), "encoder0/sensor.yaml:4: resolution: '40.96' is not a whole number"));
+  }
+}
+
+TEST_CASE("calibration: poses of another body are turned into the IMU's frame, with a warning") {
+  const TempFolder folder;
+  write_full_recording(folder.path());
+  const Calibration before = load(folder.path());
+  // The IMU sits 0.2 m ahead of the body of the files and is turned by 90 degrees about z.
+  replace_in(folder / "imu0/sensor.yaml", "[1,0,0,0, 0,1,0,0,", "[0,-1,0,0.2, 1,0,0,0,");
+  Warnings warnings;
+  const Calibration after = load_calibration(folder.path(), {}, warnings);
+  CHECK(warnings.list().size() == 1);
+
+  Eigen::Isometry3d T_FB = Eigen::Isometry3d::Identity();
+  T_FB.translation().x() = 0.2;
+  T_FB.linear() << 0, -1, 0, 1, 0, 0, 0, 0, 1;
+  CHECK((T_FB * after.cameras[0].T_BC).isApprox(before.cameras[0].T_BC));
+  CHECK((T_FB * after.encoder->T_BO).isApprox(before.encoder->T_BO));
+  CHECK((T_FB * after.lasers->beams[0].p_BL).isApprox(before.lasers->beams[0].p_BL));
+  CHECK((T_FB.linear() * after.lasers->beams[0].d_B).isApprox(before.lasers->beams[0].d_B));
+}
+
+TEST_CASE("kalibr: camchain and imu.yaml as they are") {
+  const TempFolder folder;
+  write_text(folder / "camchain-imucam.yaml", kCamchain);
+  write_text(folder / "imu.yaml", kKalibrImu);
+  const Calibration c = load_kalibr(folder / "camchain-imucam.yaml", folder / "imu.yaml");
+
+  REQUIRE(c.cameras.size() == 2);
+  // T_cam_imu takes the IMU's points to the camera: a camera at (0.1, 0.05, 0) that looks forward.
+  CHECK(c.cameras[0].T_BC.translation().isApprox(Eigen::Vector3d(0.1, 0.05, 0.0)));
+  CHECK((c.cameras[0].T_BC.linear() * Eigen::Vector3d::UnitZ()).isApprox(Eigen::Vector3d::UnitX()));
+  // T_cn_cnm1 takes cam0's points to cam1, which lies 0.1 m to its right.
+  CHECK(c.cameras[1].T_BC.translation().isApprox(Eigen::Vector3d(0.1, -0.05, 0.0)));
+  CHECK(c.cameras[0].lens == LensModel::equidistant);
+  CHECK(c.cameras[1].lens == LensModel::radial_tangential);
+  CHECK(c.cameras[0].distortion[3] == 0.4);
+  CHECK(c.camera_time_offset == -0.0125);  // t_imu = t_cam + shift
+  CHECK(c.imu.rate_hz == 250.0);
+  CHECK(c.imu.gyro_noise == 0.004);
+  CHECK(c.imu.accel_random_walk == 0.003);
+  CHECK(check_calibration(c).empty());
+}
+
+TEST_CASE("kalibr: replaces a recording's cameras and IMU, not its wheels and lasers") {
+  const TempFolder folder;
+  write_full_recording(folder / "mav0");
+  write_text(folder / "chain.yaml", kCamchain);
+  write_text(folder / "imu.yaml", kKalibrImu);
+  const Calibration cameras_only = load(folder / "mav0", {folder / "chain.yaml"});
+  CHECK(cameras_only.cameras[0].lens == LensModel::equidistant);
+  CHECK(cameras_only.imu.rate_hz == 100.0);
+  CHECK(cameras_only.encoder);
+  const Calibration both = load(folder / "mav0", {folder / "imu.yaml", folder / "chain.yaml"});
+  CHECK(both.imu.rate_hz == 250.0);
+  CHECK(both.camera_time_offset == -0.0125);
+
+  fs::remove(folder / "mav0/cam0/sensor.yaml");  // not needed any more
+  fs::remove(folder / "mav0/imu0/sensor.yaml");
+  CHECK(load(folder / "mav0", {folder / "imu.yaml", folder / "chain.yaml"}).cameras.size() == 2);
+
+  fs::remove_all(folder / "mav0/cam1");  // calibrated, but not recorded
+  CHECK(load(folder / "mav0", {folder / "imu.yaml", folder / "chain.yaml"}).cameras.size() == 1);
+}
+
+TEST_CASE("kalibr: imu.yaml with a key imu0, and files that are neither") {
+  const TempFolder folder;
+  write_full_recording(folder / "mav0");
+  write_text(folder / "imu.yaml",
+             "imu0:\n  accelerometer_noise_density: 0.02\n  accelerometer_random_walk: 0.003\n"
+             "  gyroscope_noise_density: 0.004\n  gyroscope_random_walk: 0.00005\n  update_rate: 250.0\n");
+  CHECK(load(folder / "mav0", {folder / "imu.yaml"}).imu.rate_hz == 250.0);
+
+  write_text(folder / "other.yaml", "a: 1\n");
+  CHECK(contains(input_error_of([&] { load(folder / "mav0", {folder / "other.yaml"}); }), "other.yaml: neither"));
+
+  write_text(folder / "chain.yaml", kCamchain);
+  replace_in(folder / "chain.yaml", "T_cam_imu", "T_cam_body");
+  CHECK(contains(input_error_of([&] { load(folder / "mav0", {folder / "chain.yaml"}); }), "cam0.T_cam_imu: missing"));
+}

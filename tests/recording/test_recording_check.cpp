@@ -1,0 +1,137 @@
+#include <doctest/doctest.h>
+
+#include <random>
+
+#include "src/recording/recording_check.h"
+#include "tests/recording/support.h"
+
+using namespace ear;
+using namespace ear::test;
+
+namespace {
+
+bool has_finding(const RecordingReport& report, Severity severity, const std::string& where, const std::string& part) {
+  return std::any_of(report.findings.begin(), report.findings.end(), [&](const Finding& f) {
+    return f.severity == severity && contains(f.where, where) && contains(f.message, part);
+  });
+}
+
+ImuSample imu_at(int index, double gyro_x, double accel_x) {
+  ImuSample sample;
+  sample.t_ns = index * 5'000'000LL;  // 200 Hz
+  sample.gyro_B.x() = gyro_x;
+  sample.accel_B << accel_x, 0.0, 9.81;
+  return sample;
+}
+
+}  // namespace
+
+TEST_CASE("timing: rate, jitter and gaps") {
+  StreamTiming timing;
+  CHECK(timing.report().count == 0);
+  TimeNs t = 1'000'000'000;
+  for (int i = 0; i < 100; ++i) {
+    timing.add(t + (i % 2 == 0 ? 1'000'000 : -1'000'000));
+    t += i == 50 ? 500'000'000 : 10'000'000;
+  }
+  const TimingReport report = timing.report();
+  CHECK(report.count == 100);
+  CHECK(report.first_ns == 1'001'000'000);
+  CHECK(report.gaps == 1);
+  CHECK(report.longest_gap == doctest::Approx(0.498));
+  CHECK(report.jitter_s == doctest::Approx(0.002).epsilon(0.02));  // intervals of 8 and 12 ms
+  CHECK((report.rate_hz > 80.0 && report.rate_hz < 130.0));
+}
+
+TEST_CASE("imu check: clipping is an extreme value that stays") {
+  ImuCheck check;
+  for (int i = 0; i < 100; ++i) {
+    const bool strike = i >= 40 && i < 45;
+    check.add(imu_at(i, 0.01 * (i % 3), strike ? 78.5 : 0.1 * (i % 7)));
+  }
+  CHECK(check.report().clipped == 5);
+}
+
+TEST_CASE("imu check: a larger value later shows that it was no clipping") {
+  ImuCheck check;
+  for (const double accel : {0.0, 50.0, 50.0, 0.0, 60.0, 0.0}) check.add(imu_at(0, 0.0, accel));
+  CHECK(check.report().clipped == 0);
+}
+
+TEST_CASE("imu check: equal small values are quantisation, not clipping") {
+  ImuCheck check;
+  for (int i = 0; i < 100; ++i) check.add(imu_at(i, 0.001 * ((i / 5) % 2), 0.0));
+  CHECK(check.report().clipped == 0);
+  CHECK(check.report().repeated == 80);
+}
+
+TEST_CASE("imu check: noise at rest, not in motion") {
+  std::mt19937 rng{3};
+  std::normal_distribution<double> normal;
+  const double sample_rate_root = std::sqrt(200.0);
+  ImuCheck rest;
+  ImuCheck motion;
+  for (int i = 0; i < 2000; ++i) {
+    ImuSample sample = imu_at(i, 0.0, 0.0);
+    for (int axis = 0; axis < 3; ++axis) {
+      sample.gyro_B(axis) = 0.03 + 1e-3 * sample_rate_root * normal(rng);
+      sample.accel_B(axis) += 1e-2 * sample_rate_root * normal(rng);
+    }
+    rest.add(sample);
+    sample.gyro_B.z() += std::sin(0.01 * i);
+    motion.add(sample);
+  }
+  REQUIRE(rest.report().standing_noise);
+  CHECK(rest.report().standing_noise->windows >= 9);
+  CHECK(rest.report().standing_noise->gyro == doctest::Approx(1e-3).epsilon(0.05));
+  CHECK(rest.report().standing_noise->accel == doctest::Approx(1e-2).epsilon(0.05));
+  CHECK_FALSE(motion.report().standing_noise);
+}
+
+TEST_CASE("check: a good recording") {
+  const TempFolder folder;
+  write_full_recording(folder / "mav0");
+  const RecordingReport report = check_recording(folder.path(), {});
+  CHECK(report.usable());
+  CHECK(report.warnings.empty());
+  REQUIRE(report.streams.size() == 4);
+  CHECK(report.streams[0].name == "imu0");
+  CHECK(report.streams[0].timing.count == 101);
+  CHECK(report.streams[3].name == "cam0+cam1");
+  CHECK(report.streams[3].timing.rate_hz == doctest::Approx(10.0));
+  CHECK(report.streams[3].covered_by_imu == 1.0);
+}
+
+TEST_CASE("check: streams that do not meet, gaps, wrong rates") {
+  const TempFolder folder;
+  write_full_recording(folder / "mav0");
+  std::string csv = "#t,l,r\n";
+  for (int i = 0; i < 50; ++i) csv += std::to_string(i * 30'000'000LL + (i > 30 ? 400'000'000LL : 0)) + ",1,1\n";
+  write_text(folder / "mav0/encoder0/data.csv", csv);
+  write_text(folder / "mav0/laser0/data.csv", "#t\n5000000000,0.1,0.1,0.1\n5020000000,0.1,0.1,0.1\n");
+  const RecordingReport report = check_recording(folder.path(), {});
+  CHECK_FALSE(report.usable());
+  CHECK(has_finding(report, Severity::error, "laser0", "no time at which there are inertial"));
+  CHECK(has_finding(report, Severity::warning, "encoder0", "% of its time only"));
+  CHECK(has_finding(report, Severity::warning, "encoder0", "1 gaps, the longest 0.43 s"));
+  CHECK(has_finding(report, Severity::warning, "encoder0", "33.3 Hz, but its calibration says 100 Hz"));
+}
+
+TEST_CASE("check: a calibration that cannot be is reported with the rest") {
+  const TempFolder folder;
+  write_full_recording(folder / "mav0");
+  write_text(folder / "mav0/cam1/sensor.yaml", camera_yaml("0.3"));
+  write_image(folder / "mav0/cam0/data/0.png", 3, CV_8UC1, {20, 12});
+  const RecordingReport report = check_recording(folder.path(), {});
+  CHECK_FALSE(report.usable());
+  CHECK(has_finding(report, Severity::error, "cam1: T_BS", "swapped"));
+  CHECK(has_finding(report, Severity::error, "cam0: resolution", "20x12"));
+  CHECK(report.streams.size() == 4);
+}
+
+TEST_CASE("check: what cannot be read is a finding, not an exception") {
+  const TempFolder folder;
+  const RecordingReport report = check_recording(folder / "none", {});
+  CHECK_FALSE(report.usable());
+  CHECK(has_finding(report, Severity::error, "recording", "no such folder"));
+}

@@ -1,0 +1,113 @@
+#include <doctest/doctest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "src/recording/csv.h"
+#include "src/recording/writers.h"
+#include "tests/recording/support.h"
+
+using namespace ear;
+using namespace ear::test;
+
+namespace {
+
+// Every number differs, so that a column in the wrong place shows.
+Estimate numbered_estimate() {
+  Estimate e;
+  e.state.t_ns = 1403715273262142976;
+  e.state.p_WB << 1, 2, 3;
+  e.state.q_WB = Eigen::Quaterniond(0.5, -0.5, 0.5, -0.5);
+  e.state.v_W << 4, 5, 6;
+  e.state.b_g << 7, 8, 9;
+  e.state.b_a << 10, 11, 12;
+  for (int i = 0; i < estimate_error::size; ++i) {
+    for (int j = 0; j < estimate_error::size; ++j) e.covariance(i, j) = 100 * std::min(i, j) + std::max(i, j);
+  }
+  e.frame = {60, 61, 62, 63, 64, true};
+  return e;
+}
+
+}  // namespace
+
+TEST_CASE("tum: nanoseconds survive, quaternion with w last") {
+  const TempFolder folder;
+  {
+    TumWriter writer(folder / "a.tum");
+    writer.write(numbered_estimate());
+    NavState early;
+    early.t_ns = 5;
+    writer.write(early);
+    early.t_ns = -1'000'000'005;
+    writer.write(early);
+  }
+  const std::string text = read_text(folder / "a.tum");
+  CHECK(contains(text,
+                 "1403715273.262142976 1.000000000 2.000000000 3.000000000 -0.500000000 0.500000000 -0.500000000 "
+                 "0.500000000\n"));
+  CHECK(contains(text, "\n0.000000005 0.000000000 0.000000000 0.000000000 0.000000000 0.000000000 0.000000000 1.0"));
+  CHECK(contains(text, "\n-1.000000005 0"));
+}
+
+TEST_CASE("states: every value stands below its name") {
+  const TempFolder folder;
+  StatesWriter(folder / "states.csv").write(numbered_estimate());
+  std::ifstream file(folder / "states.csv");
+  std::string heading;
+  std::string values;
+  std::getline(file, heading);
+  std::getline(file, values);
+
+  std::map<std::string, std::string> row;
+  std::istringstream names(heading);
+  std::istringstream fields(values);
+  std::string name;
+  std::string field;
+  while (std::getline(names, name, ',')) {
+    REQUIRE(std::getline(fields, field, ','));
+    CHECK(row.emplace(name, field).second);
+  }
+  CHECK_FALSE(std::getline(fields, field, ','));
+
+  CHECK(row.size() == 1 + 3 + 4 + 9 + 21 + 9 + 6);
+  CHECK(row["t_ns"] == "1403715273262142976");
+  CHECK(row["p_z"] == "3");
+  CHECK(row["q_w"] == "0.5");
+  CHECK(row["q_x"] == "-0.5");
+  CHECK(row["v_y"] == "5");
+  CHECK(row["b_g_x"] == "7");
+  CHECK(row["b_a_z"] == "12");
+  CHECK(row["cov_x_x"] == "606");  // position is 6 to 8 in the covariance, rotation 0 to 2
+  CHECK(row["cov_x_y"] == "607");
+  CHECK(row["cov_z_rx"] == "8");
+  CHECK(row["cov_rx_rz"] == "2");
+  CHECK(row["cov_rz_rz"] == "202");
+  CHECK(std::stod(row["sigma_v_x"]) == doctest::Approx(std::sqrt(303.0)));
+  CHECK(std::stod(row["sigma_b_g_y"]) == doctest::Approx(std::sqrt(1010.0)));
+  CHECK(std::stod(row["sigma_b_a_z"]) == doctest::Approx(std::sqrt(1414.0)));
+  CHECK(row["tracks"] == "60");
+  CHECK(row["clones"] == "64");
+  CHECK(row["standing"] == "1");
+}
+
+TEST_CASE("summary: valid JSON with all that was said") {
+  const TempFolder folder;
+  RunSummary summary;
+  summary.recording = "path with \"quotes\"";
+  summary.counts = {{"frames", 7}, {"estimates", 6}};
+  summary.duration_s = 1.5;
+  summary.stage_times_s = {{"update", 0.25}};
+  summary.warnings = {{"imu0: torn last line", 1, "data.csv:9: line: 3 fields, not 7"}};
+  write_summary(summary, folder / "summary.json");
+  const auto json = nlohmann::json::parse(read_text(folder / "summary.json"));
+  CHECK(json["recording"] == summary.recording);
+  CHECK(json["counts"]["estimates"] == 6);
+  CHECK(json["duration_s"] == 1.5);
+  CHECK(json["stage_times_s"]["update"] == 0.25);
+  CHECK(json["warnings"][0]["count"] == 1);
+  CHECK(json["warnings"][0]["first"] == summary.warnings[0].first);
+}
+
+TEST_CASE("writers: a file that cannot be created is an error that names it") {
+  const TempFolder folder;
+  CHECK(contains(input_error_of([&] { TumWriter(folder / "no/such/folder/a.tum"); }), "a.tum"));
+}
