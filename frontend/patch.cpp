@@ -1,8 +1,9 @@
 #include "frontend/patch.h"
 
-#include <Eigen/Eigenvalues>
+#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <cmath>
+#include <cstring>
 
 namespace ear {
 namespace {
@@ -15,11 +16,21 @@ constexpr float kAffinePrior = 3600.0F;
 
 constexpr float kMinGain = 0.1F;  // contrast of the image over that of the patch; below, it is not the same thing
 
-constexpr int kFixedBits = 16;   // fraction of a fixed-point pixel coordinate
-constexpr int kWeightBits = 11;  // 8 + 2 * 11 bits fit into an int
-constexpr int kWeightOne = 1 << kWeightBits;
+// Pixel coordinates in fixed point: integer part and weight are cheap to take apart.
+constexpr int kFixedBits = 16;
+constexpr int kFixedOne = 1 << kFixedBits;
 
-int to_fixed(float value) { return static_cast<int>(std::lround(value * static_cast<float>(1 << kFixedBits))); }
+// Added to coordinates before they are cut off, so that those in the border are positive and round down as well.
+constexpr int kOffset = 64;
+
+int to_fixed(float value) { return static_cast<int>(value * static_cast<float>(kFixedOne)); }
+
+// Interpolates within a pair of neighbouring pixels, fetched from memory as one number (little-endian).
+float blend(int pair, float weight) {
+  const float first = static_cast<float>(pair & 255);
+  const float second = static_cast<float>(pair >> 8);
+  return first + weight * (second - first);
+}
 
 // Whether all offsets up to `half` from the centre can be interpolated.
 bool inside(const GreyLevel& level, const Warp& warp, float half) {
@@ -32,27 +43,45 @@ bool inside(const GreyLevel& level, const Warp& warp, float half) {
          warp.centre.x() + reach.x() <= high_x && warp.centre.y() + reach.y() <= high_y;
 }
 
-// Bilinear samples of an n x n patch under a warp; the caller has checked that it is inside.
+// Bilinear samples of an n x n patch under a warp; the caller has checked that it is inside. Fetching is kept apart from
+// arithmetic, which compilers then turn into vector code.
 template <int n>
 void sample(const GreyLevel& level, const Warp& warp, float* out) {
   constexpr float kReach = 0.5F * (n - 1);
-  constexpr float kScale = 1.0F / static_cast<float>(kWeightOne * kWeightOne);
+  constexpr float kScale = 1.0F / static_cast<float>(kFixedOne);
   const Eigen::Vector2f start = warp.centre - kReach * warp.affine.rowwise().sum();
-  const int step_xx = to_fixed(warp.affine(0, 0));
-  const int step_yx = to_fixed(warp.affine(1, 0));
-  for (int row = 0; row < n; ++row) {
+  const int step_x = to_fixed(warp.affine(0, 0));
+  const int step_y = to_fixed(warp.affine(1, 0));
+  const std::ptrdiff_t stride = level.stride;
+  const std::uint8_t* origin = level.origin - kOffset * (stride + 1);
+  std::array<int, n> along_x, along_y;  // from the first pixel of a row
+  for (int i = 0; i < n; ++i) {
+    along_x[static_cast<std::size_t>(i)] = i * step_x;
+    along_y[static_cast<std::size_t>(i)] = i * step_y;
+  }
+  std::array<int, n> x, y, above, below;  // the last two: pairs of neighbouring pixels
+  for (int row = 0; row < n; ++row, out += n) {
     const Eigen::Vector2f first = start + static_cast<float>(row) * warp.affine.col(1);
-    int x = to_fixed(first.x());
-    int y = to_fixed(first.y());
-    for (int column = 0; column < n; ++column) {
-      const std::uint8_t* p = level.origin + (y >> kFixedBits) * level.stride + (x >> kFixedBits);
-      const int wx = (x >> (kFixedBits - kWeightBits)) & (kWeightOne - 1);
-      const int wy = (y >> (kFixedBits - kWeightBits)) & (kWeightOne - 1);
-      const int top = (p[0] << kWeightBits) + wx * (p[1] - p[0]);
-      const int bottom = (p[level.stride] << kWeightBits) + wx * (p[level.stride + 1] - p[level.stride]);
-      *out++ = kScale * static_cast<float>((top << kWeightBits) + wy * (bottom - top));
-      x += step_xx;
-      y += step_yx;
+    const int first_x = to_fixed(first.x() + static_cast<float>(kOffset));
+    const int first_y = to_fixed(first.y() + static_cast<float>(kOffset));
+    for (std::size_t i = 0; i < n; ++i) {
+      x[i] = first_x + along_x[i];
+      y[i] = first_y + along_y[i];
+    }
+    for (std::size_t i = 0; i < n; ++i) {
+      const std::uint8_t* p = origin + (y[i] >> kFixedBits) * stride + (x[i] >> kFixedBits);
+      std::uint16_t pair;
+      std::memcpy(&pair, p, 2);
+      above[i] = pair;
+      std::memcpy(&pair, p + stride, 2);
+      below[i] = pair;
+    }
+    for (std::size_t i = 0; i < n; ++i) {
+      const float weight_x = kScale * static_cast<float>(x[i] & (kFixedOne - 1));
+      const float weight_y = kScale * static_cast<float>(y[i] & (kFixedOne - 1));
+      const float top = blend(above[i], weight_x);
+      const float bottom = blend(below[i], weight_x);
+      out[i] = top + weight_y * (bottom - top);
     }
   }
 }
@@ -63,24 +92,6 @@ float derivative(const float* p, std::ptrdiff_t stride) {
   return (8.0F * (p[stride] - p[-stride]) - (p[2 * stride] - p[-2 * stride])) * (1.0F / 12.0F);
 }
 
-// One accumulator for each column: rows are added up side by side, which compilers turn into vector code.
-using Lanes = std::array<float, kSize>;
-
-float total(const Lanes& lanes) {
-  float sum = 0.0F;
-  for (const float lane : lanes) sum += lane;
-  return sum;
-}
-
-// Sum over the lanes, weighted with the x offset from the patch's centre.
-float total_times_x(const Lanes& lanes) {
-  float sum = 0.0F;
-  for (int column = 0; column < kSize; ++column) {
-    sum += (static_cast<float>(column) - kHalf) * lanes[static_cast<std::size_t>(column)];
-  }
-  return sum;
-}
-
 // Brightness of the image under the patch, relative to the patch.
 struct Photometry {
   float mean = 0.0F;         // of the image, less the mean of the patch
@@ -88,30 +99,77 @@ struct Photometry {
   float correlation = 0.0F;  // zero-mean normalized
 };
 
-struct Sums {
-  Lanes image{}, image2{}, product{};
+using Quad = Eigen::Array4f;  // four pixels of a row, side by side in a vector register
 
-  // `image_row` has the patch's mean removed.
-  void add_row(const float* image_row, const float* value_row) {
-    for (std::size_t i = 0; i < kSize; ++i) {
-      image[i] += image_row[i];
-      image2[i] += image_row[i] * image_row[i];
-      product[i] += image_row[i] * value_row[i];
-    }
+constexpr std::size_t kQuad = 4;
+
+Quad load(const float* p) { return Eigen::Map<const Quad, Eigen::Aligned16>(p); }
+
+// Offsets from the patch's centre of four pixels in a row.
+Quad offsets(std::size_t first_column) {
+  return Quad(0.0F, 1.0F, 2.0F, 3.0F) + (static_cast<float>(first_column) - kHalf);
+}
+
+float offset(std::size_t row) { return static_cast<float>(row) - kHalf; }
+
+// What every comparison of image and patch adds up. The image has the mean of the patch removed.
+struct PhotometricSums {
+  Quad image = Quad::Zero();
+  Quad image2 = Quad::Zero();
+  Quad product = Quad::Zero();
+
+  void add(const Quad& image_quad, const Quad& value_quad) {
+    image += image_quad;
+    image2 += image_quad * image_quad;
+    product += image_quad * value_quad;
   }
 
   [[nodiscard]] Photometry photometry(float energy) const {
     constexpr float kInverseCount = 1.0F / static_cast<float>(kSize * kSize);
     Photometry p;
-    const float sum = total(image);
+    const float sum = image.sum();
     p.mean = sum * kInverseCount;
-    const float variance = total(image2) - sum * p.mean;
-    const float covariance = total(product);
+    const float variance = image2.sum() - sum * p.mean;
+    const float covariance = product.sum();
     p.gain = covariance / energy;
     p.correlation = variance > 0.0F ? covariance / std::sqrt(variance * energy) : 0.0F;
     return p;
   }
 };
+
+// Sums of one row of a quantity q: q, q x, q x^2 with the offset x of each pixel.
+struct RowMoments {
+  Quad q = Quad::Zero();
+  Quad q_x = Quad::Zero();
+  Quad q_xx = Quad::Zero();
+
+  void add(const Quad& value, const Quad& offset_x) {
+    const Quad value_x = value * offset_x;
+    q += value;
+    q_x += value_x;
+    q_xx += value_x * offset_x;
+  }
+
+  // Adds q (1, x, y) of the row at offset y.
+  void add_to(Eigen::Vector3f& sum, float y) const {
+    const float s = q.sum();
+    sum += Eigen::Vector3f(s, q_x.sum(), s * y);
+  }
+
+  // Adds q (1, x, y)^T (1, x, y) of the row at offset y.
+  void add_to(Eigen::Matrix3f& sum, float y) const {
+    const float s = q.sum();
+    const float s_x = q_x.sum();
+    Eigen::Matrix3f m;
+    m << s, s_x, s * y, s_x, q_xx.sum(), s_x * y, s * y, s_x * y, s * y * y;
+    sum += m;
+  }
+};
+
+float smaller_eigenvalue(const Eigen::Matrix2f& m) {
+  const float half_difference = 0.5F * (m(0, 0) - m(1, 1));
+  return 0.5F * m.trace() - std::sqrt(half_difference * half_difference + m(0, 1) * m(0, 1));
+}
 
 }  // namespace
 
@@ -120,61 +178,69 @@ bool PatchLevel::capture(const GreyLevel& level, const Eigen::Vector2f& centre) 
   constexpr int kWide = kSize + 2 * kReach;
   const Warp warp{centre, Eigen::Matrix2f::Identity()};
   if (!inside(level, warp, kHalf + kReach)) return false;
-  std::array<float, kWide * kWide> wide;
+  alignas(16) std::array<float, kWide * kWide> wide;
   sample<kWide>(level, warp, wide.data());
 
-  Lanes sum{};
-  for (int row = 0; row < kSize; ++row) {
-    const float* in = &wide[static_cast<std::size_t>((row + kReach) * kWide + kReach)];
-    const std::size_t out = static_cast<std::size_t>(row * kSize);
+  float sum = 0.0F;
+  for (std::size_t row = 0; row < kSize; ++row) {
+    const float* in = &wide[(row + kReach) * kWide + kReach];
     for (std::size_t i = 0; i < kSize; ++i) {
-      value_[out + i] = in[i];
-      gradient_x_[out + i] = derivative(in + i, 1);
-      gradient_y_[out + i] = derivative(in + i, kWide);
-      sum[i] += in[i];
+      const std::size_t at = row * kSize + i;
+      value_[at] = in[i];
+      gradient_x_[at] = derivative(in + i, 1);
+      gradient_y_[at] = derivative(in + i, kWide);
+      sum += in[i];
     }
   }
-  mean_ = total(sum) / static_cast<float>(kPixels);
+  mean_ = sum / static_cast<float>(kPixels);
   for (float& v : value_) v -= mean_;
+  return solve_normal_equations();
+}
 
-  // Normal equations of the six parameters, and their products with a constant and with the patch.
-  Matrix6f information = Matrix6f::Zero();
-  J_sum_.setZero();
-  J_value_.setZero();
-  energy_ = 0.0F;
-  Eigen::Matrix3f xx = Eigen::Matrix3f::Zero();  // sums of gx gx (1, x, y)^T (1, x, y), and so on
+bool PatchLevel::solve_normal_equations() {
+  // A gradient times (1, x, y) gives three parameters, so every sum below is a 3x3 or 3x1 of moments over the patch.
+  Eigen::Matrix3f xx = Eigen::Matrix3f::Zero();
   Eigen::Matrix3f xy = Eigen::Matrix3f::Zero();
   Eigen::Matrix3f yy = Eigen::Matrix3f::Zero();
-  Eigen::Vector3f x_sum = Eigen::Vector3f::Zero(), y_sum = x_sum, x_value = x_sum, y_value = x_sum;
-  for (int row = 0; row < kSize; ++row) {
-    Lanes gxx, gxy, gyy, gxv, gyv;
-    const std::size_t at = static_cast<std::size_t>(row * kSize);
-    for (std::size_t i = 0; i < kSize; ++i) {
-      const float gx = gradient_x_[at + i];
-      const float gy = gradient_y_[at + i];
-      gxx[i] = gx * gx;
-      gxy[i] = gx * gy;
-      gyy[i] = gy * gy;
-      gxv[i] = gx * value_[at + i];
-      gyv[i] = gy * value_[at + i];
+  Eigen::Vector3f x_sum = Eigen::Vector3f::Zero();
+  Eigen::Vector3f y_sum = Eigen::Vector3f::Zero();
+  Eigen::Vector3f x_value = Eigen::Vector3f::Zero();
+  Eigen::Vector3f y_value = Eigen::Vector3f::Zero();
+  energy_ = 0.0F;
+  for (std::size_t row = 0; row < kSize; ++row) {
+    RowMoments gxx, gxy, gyy, gx, gy, gxv, gyv;
+    Quad energy = Quad::Zero();
+    for (std::size_t column = 0; column < kSize; column += kQuad) {
+      const std::size_t at = row * kSize + column;
+      const Quad x = load(&gradient_x_[at]);
+      const Quad y = load(&gradient_y_[at]);
+      const Quad v = load(&value_[at]);
+      const Quad offset_x = offsets(column);
+      gxx.add(x * x, offset_x);
+      gxy.add(x * y, offset_x);
+      gyy.add(y * y, offset_x);
+      gx.add(x, offset_x);
+      gy.add(y, offset_x);
+      gxv.add(x * v, offset_x);
+      gyv.add(y * v, offset_x);
+      energy += v * v;
     }
-    const float y = static_cast<float>(row) - kHalf;
-    for (std::size_t i = 0; i < kSize; ++i) {
-      const Eigen::Vector3f w(1.0F, static_cast<float>(i) - kHalf, y);
-      xx += gxx[i] * w * w.transpose();
-      xy += gxy[i] * w * w.transpose();
-      yy += gyy[i] * w * w.transpose();
-      x_sum += gradient_x_[at + i] * w;
-      y_sum += gradient_y_[at + i] * w;
-      x_value += gxv[i] * w;
-      y_value += gyv[i] * w;
-      energy_ += value_[at + i] * value_[at + i];
-    }
+    const float offset_y = offset(row);
+    gxx.add_to(xx, offset_y);
+    gxy.add_to(xy, offset_y);
+    gyy.add_to(yy, offset_y);
+    gx.add_to(x_sum, offset_y);
+    gy.add_to(y_sum, offset_y);
+    gxv.add_to(x_value, offset_y);
+    gyv.add_to(y_value, offset_y);
+    energy_ += energy.sum();
   }
   if (!(energy_ > 0.0F)) return false;
-  // From (gx, gy) x (1, x, y) to the order of the parameters: x, y, xx, xy, yx, yy.
+
+  // From gradients (x, y) times (1, x, y) to the order of the parameters: x, y, xx, xy, yx, yy.
   constexpr std::array<int, 3> kX{0, 2, 3};
   constexpr std::array<int, 3> kY{1, 4, 5};
+  Matrix6f information;
   for (int i = 0; i < 3; ++i) {
     const int xi = kX[static_cast<std::size_t>(i)];
     const int yi = kY[static_cast<std::size_t>(i)];
@@ -196,31 +262,31 @@ bool PatchLevel::capture(const GreyLevel& level, const Eigen::Vector2f& centre) 
   information -= J_value_ * J_value_.transpose() / energy_;
 
   const Eigen::Matrix2f structure = information.topLeftCorner<2, 2>();
-  corner_strength_ = Eigen::SelfAdjointEigenSolver<Eigen::Matrix2f>().computeDirect(structure).eigenvalues()[0];
+  corner_strength_ = smaller_eigenvalue(structure);
   if (!(corner_strength_ > 1.0F)) return false;
   covariance_position_ = structure.inverse();
   information.diagonal().tail<4>().array() += kAffinePrior;
-  covariance_affine_ = information.inverse();
+  covariance_affine_ = information.llt().solve(Matrix6f::Identity());
   return true;
 }
 
 std::optional<PatchLevel::Step> PatchLevel::step_position(const GreyLevel& level, float scale, Warp& warp) const {
   if (!inside(level, warp, kHalf)) return std::nullopt;
-  Pixels image;
+  alignas(16) Pixels image;
   sample<kSize>(level, warp, image.data());
-  Sums sums;
-  Lanes x{}, y{};
-  for (std::size_t at = 0; at < kPixels; at += kSize) {
-    for (std::size_t i = 0; i < kSize; ++i) image[at + i] -= mean_;
-    sums.add_row(&image[at], &value_[at]);
-    for (std::size_t i = 0; i < kSize; ++i) {
-      x[i] += gradient_x_[at + i] * image[at + i];
-      y[i] += gradient_y_[at + i] * image[at + i];
-    }
+  PhotometricSums sums;
+  Quad x = Quad::Zero();
+  Quad y = Quad::Zero();
+  for (std::size_t at = 0; at < kPixels; at += kQuad) {
+    const Quad quad = load(&image[at]) - mean_;
+    sums.add(quad, load(&value_[at]));
+    x += load(&gradient_x_[at]) * quad;
+    y += load(&gradient_y_[at]) * quad;
   }
   const Photometry p = sums.photometry(energy_);
   if (!(p.gain > kMinGain)) return std::nullopt;
-  const Eigen::Vector2f residual = Eigen::Vector2f(total(x), total(y)) - p.mean * J_sum_.head<2>() - p.gain * J_value_.head<2>();
+  const Eigen::Vector2f residual =
+      Eigen::Vector2f(x.sum(), y.sum()) - p.mean * J_sum_.head<2>() - p.gain * J_value_.head<2>();
   const Eigen::Vector2f moved = warp.affine * (covariance_position_ * residual) * (-scale / p.gain);
   warp.centre += moved;
   return Step{p.correlation, moved};
@@ -229,28 +295,32 @@ std::optional<PatchLevel::Step> PatchLevel::step_position(const GreyLevel& level
 std::optional<PatchLevel::Step> PatchLevel::step_affine(const GreyLevel& level, const Eigen::Matrix2f& prior,
                                                         float scale, Warp& warp) const {
   if (!inside(level, warp, kHalf)) return std::nullopt;
-  Pixels image;
+  alignas(16) Pixels image;
   sample<kSize>(level, warp, image.data());
-  Sums sums;
-  Lanes x{}, y{}, x_y{}, y_y{};
-  for (int row = 0; row < kSize; ++row) {
-    const std::size_t at = static_cast<std::size_t>(row * kSize);
-    const float offset_y = static_cast<float>(row) - kHalf;
-    for (std::size_t i = 0; i < kSize; ++i) image[at + i] -= mean_;
-    sums.add_row(&image[at], &value_[at]);
-    for (std::size_t i = 0; i < kSize; ++i) {
-      const float product_x = gradient_x_[at + i] * image[at + i];
-      const float product_y = gradient_y_[at + i] * image[at + i];
-      x[i] += product_x;
-      y[i] += product_y;
-      x_y[i] += product_x * offset_y;
-      y_y[i] += product_y * offset_y;
+  PhotometricSums sums;
+  Quad x = Quad::Zero(), x_x = x, x_y = x;  // gradient in x times image, times 1, offset in x, offset in y
+  Quad y = Quad::Zero(), y_x = y, y_y = y;
+  for (std::size_t row = 0; row < kSize; ++row) {
+    const float offset_y = offset(row);
+    for (std::size_t column = 0; column < kSize; column += kQuad) {
+      const std::size_t at = row * kSize + column;
+      const Quad quad = load(&image[at]) - mean_;
+      sums.add(quad, load(&value_[at]));
+      const Quad product_x = load(&gradient_x_[at]) * quad;
+      const Quad product_y = load(&gradient_y_[at]) * quad;
+      const Quad offset_x = offsets(column);
+      x += product_x;
+      x_x += product_x * offset_x;
+      x_y += product_x * offset_y;
+      y += product_y;
+      y_x += product_y * offset_x;
+      y_y += product_y * offset_y;
     }
   }
   const Photometry p = sums.photometry(energy_);
   if (!(p.gain > kMinGain)) return std::nullopt;
   Vector6f residual;
-  residual << total(x), total(y), total_times_x(x), total(x_y), total_times_x(y), total(y_y);
+  residual << x.sum(), y.sum(), x_x.sum(), x_y.sum(), y_x.sum(), y_y.sum();
   residual -= p.mean * J_sum_ + p.gain * J_value_;
   residual /= p.gain;
 
@@ -271,13 +341,10 @@ std::optional<PatchLevel::Step> PatchLevel::step_affine(const GreyLevel& level, 
 
 std::optional<float> PatchLevel::correlate(const GreyLevel& level, const Warp& warp) const {
   if (!inside(level, warp, kHalf)) return std::nullopt;
-  Pixels image;
+  alignas(16) Pixels image;
   sample<kSize>(level, warp, image.data());
-  Sums sums;
-  for (std::size_t at = 0; at < kPixels; at += kSize) {
-    for (std::size_t i = 0; i < kSize; ++i) image[at + i] -= mean_;
-    sums.add_row(&image[at], &value_[at]);
-  }
+  PhotometricSums sums;
+  for (std::size_t at = 0; at < kPixels; at += kQuad) sums.add(load(&image[at]) - mean_, load(&value_[at]));
   return sums.photometry(energy_).correlation;
 }
 

@@ -55,6 +55,9 @@ class PatchLevel {
   using Vector6f = Eigen::Matrix<float, 6, 1>;
   using Matrix6f = Eigen::Matrix<float, 6, 6>;
 
+  // Fills everything below from value and gradients. False if the patch has no texture in one direction.
+  bool solve_normal_equations();
+
   // Order of the parameters: position x, y; affine xx, xy, yx, yy.
   alignas(16) Pixels value_;  // mean removed
   alignas(16) Pixels gradient_x_;

@@ -4,7 +4,7 @@
 namespace ear {
 
 struct FrontendConfig {
-  int max_features = 150;      ///< tracks kept at a time
+  int max_features = 150;       ///< tracks kept at a time
   double nearest_depth = 0.15;  ///< [m] closer points are not searched for across the stereo pair
 };
 
