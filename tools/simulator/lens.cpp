@@ -38,18 +38,18 @@ Eigen::Vector2d to_pixel(const CameraCalibration& camera, const Eigen::Vector2d&
 
 Eigen::Vector2d to_ray(const CameraCalibration& camera, const Eigen::Vector2d& pixel) {
   const Eigen::Vector2d bent((pixel.x() - camera.cu) / camera.fu, (pixel.y() - camera.cv) / camera.fv);
-  Eigen::Vector2d ray = bent;
   constexpr double kStep = 1e-6;
-  for (int i = 0; i < 20; ++i) {  // Newton
-    const Eigen::Vector2d error = bend(camera, ray) - bent;
-    Eigen::Matrix2d J;
-    J.col(0) = (bend(camera, ray + Eigen::Vector2d(kStep, 0.0)) - bend(camera, ray - Eigen::Vector2d(kStep, 0.0))) /
-               (2.0 * kStep);
-    J.col(1) = (bend(camera, ray + Eigen::Vector2d(0.0, kStep)) - bend(camera, ray - Eigen::Vector2d(0.0, kStep))) /
-               (2.0 * kStep);
-    const Eigen::Vector2d step = J.inverse() * error;
+  Eigen::Matrix2d J;
+  J.col(0) = (bend(camera, bent + Eigen::Vector2d(kStep, 0.0)) - bend(camera, bent - Eigen::Vector2d(kStep, 0.0))) /
+             (2.0 * kStep);
+  J.col(1) = (bend(camera, bent + Eigen::Vector2d(0.0, kStep)) - bend(camera, bent - Eigen::Vector2d(0.0, kStep))) /
+             (2.0 * kStep);
+  const Eigen::Matrix2d J_inverse = J.inverse();
+  Eigen::Vector2d ray = bent;
+  for (int i = 0; i < 50; ++i) {  // chords: one derivative serves all steps
+    const Eigen::Vector2d step = J_inverse * (bend(camera, ray) - bent);
     ray -= step;
-    if (step.squaredNorm() < 1e-24) break;
+    if (step.squaredNorm() < 1e-26) break;
   }
   return ray;
 }

@@ -21,8 +21,8 @@ struct Block {
 constexpr std::array<Block, 16> kBlocks{{
     // Islands that the paths go round.
     {1.90, 4.70, 2.60, 5.40, 3.50, Material::concrete},  // a pillar up to the ceiling
-    {7.40, 4.70, 8.10, 5.40, 1.10, Material::cardboard},
-    {7.55, 4.80, 8.00, 5.20, 1.55, Material::wood},
+    {7.40, 4.50, 8.10, 5.20, 1.10, Material::cardboard},
+    {7.55, 4.60, 8.00, 5.00, 1.55, Material::wood},
     // Along the south wall (y = 0).
     {2.60, 0.00, 3.70, 0.35, 0.75, Material::wood},
     {5.20, 0.00, 6.60, 0.35, 1.95, Material::shelf},
@@ -69,7 +69,7 @@ void add_block(std::vector<Panel>& panels, const Block& block) {
 void add_poster(std::vector<Panel>& panels, const Panel& wall, double along, double above, double width,
                 double height) {
   const Eigen::Vector3d corner_W =
-      wall.corner_W + along * wall.u_W + (above + kBelow) * wall.v_W + 0.01 * wall.normal_W();
+      wall.corner_W + along * wall.u_W + (above + kBelow) * wall.v_W + 0.01 * wall.normal_W;
   panels.push_back({corner_W, wall.u_W, wall.v_W, width, height, Material::poster});
 }
 

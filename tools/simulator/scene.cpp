@@ -5,19 +5,16 @@
 namespace ear::simulator {
 namespace {
 
+constexpr double kTouch = 1e-3;  // [m] what is nearer to a surface lies on it
+
 // Range of a ray to a panel's front, within (0, farthest).
 std::optional<double> meet(const Panel& panel, const Eigen::Vector3d& origin_W, const Eigen::Vector3d& direction_W,
                            double farthest) {
-  const Eigen::Vector3d n_W = panel.normal_W();
-  const double approach = n_W.dot(direction_W);
+  const double approach = panel.normal_W.dot(direction_W);
   if (approach >= 0.0) return std::nullopt;
-  const double range = n_W.dot(panel.corner_W - origin_W) / approach;
+  const double range = (panel.offset - panel.normal_W.dot(origin_W)) / approach;
   if (range <= 0.0 || range >= farthest) return std::nullopt;
-  const Eigen::Vector3d q_W = origin_W + range * direction_W - panel.corner_W;
-  const double a = q_W.dot(panel.u_W);
-  const double b = q_W.dot(panel.v_W);
-  const bool inside = a >= 0.0 && b >= 0.0 && a <= panel.width && b <= panel.height;
-  return inside ? std::optional(range) : std::nullopt;
+  return panel.contains(origin_W + range * direction_W) ? std::optional(range) : std::nullopt;
 }
 
 }  // namespace
@@ -33,14 +30,15 @@ std::optional<Hit> Scene::cast(const Eigen::Vector3d& origin_W, const Eigen::Vec
 }
 
 bool Scene::sees(const Eigen::Vector3d& from_W, const Eigen::Vector3d& to_W) const {
-  const double distance = (to_W - from_W).norm();
-  const Eigen::Vector3d direction_W = (to_W - from_W) / distance;
-  const double farthest = distance - 1e-3;
   for (const Panel& panel : panels) {
-    if (meet(panel, from_W, direction_W, farthest)) return false;
+    const double above = panel.normal_W.dot(from_W) - panel.offset;
+    const double below = panel.offset - panel.normal_W.dot(to_W);
+    if (above <= 0.0 || below <= kTouch) continue;  // seen from behind, or both on one side
+    if (panel.contains(from_W + above / (above + below) * (to_W - from_W))) return false;
   }
-  // On a flat floor nothing hides behind the ground.
-  return terrain.flat() || !terrain.cast(from_W, direction_W, farthest);
+  if (terrain.flat()) return true;  // on a flat floor nothing hides behind the ground
+  const double distance = (to_W - from_W).norm();
+  return !terrain.cast(from_W, (to_W - from_W) / distance, distance - kTouch);
 }
 
 }  // namespace ear::simulator

@@ -16,11 +16,18 @@ enum class Material { floor, wall, ceiling, wood, cardboard, poster, shelf, conc
 /// A one-sided rectangle: corner + a u + b v with 0 <= a <= width, 0 <= b <= height; seen from where its normal points.
 struct Panel {
   Eigen::Vector3d corner_W;
-  Eigen::Vector3d u_W, v_W;          ///< unit vectors; normal = u x v
+  Eigen::Vector3d u_W, v_W;          ///< unit vectors
   double width = 0.0, height = 0.0;  ///< [m]
   Material material = Material::wall;
+  Eigen::Vector3d normal_W = u_W.cross(v_W);
+  double offset = normal_W.dot(corner_W);  ///< of the plane along its normal [m]
 
-  [[nodiscard]] Eigen::Vector3d normal_W() const { return u_W.cross(v_W); }
+  /// Whether a point of the panel's plane lies within the panel.
+  [[nodiscard]] bool contains(const Eigen::Vector3d& p_W) const {
+    const double a = (p_W - corner_W).dot(u_W);
+    const double b = (p_W - corner_W).dot(v_W);
+    return a >= 0.0 && b >= 0.0 && a <= width && b <= height;
+  }
 };
 
 struct Hit {
