@@ -1,6 +1,7 @@
 #include "filter/standstill.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 namespace ear {
@@ -12,7 +13,7 @@ bool StandstillDetector::update(const FeatureFrame& frame, const ImuStatistics& 
                                 double max_gyro) {
   const bool imu_quiet = imu.duration > 0.8 * config_.duration && imu.gyro_spread < config_.max_gyro_spread &&
                          imu.accel_spread < config_.max_accel_spread && (imu.gyro_mean - gyro_bias).norm() < max_gyro;
-  if (!imu_quiet || since_ns_ == kMoving || median_flow_px(frame) > config_.max_flow_px) {
+  if (!imu_quiet || since_ns_ == kMoving || common_flow_px(frame) > config_.max_flow_px) {
     restart(frame);
     return false;
   }
@@ -26,18 +27,29 @@ void StandstillDetector::restart(const FeatureFrame& frame) {
             [](const FeatureObservation& a, const FeatureObservation& b) { return a.id < b.id; });
 }
 
-double StandstillDetector::median_flow_px(const FeatureFrame& frame) {
-  flow_.clear();
+/// A shift, an expansion and a turn of the image each move the median of one component, which noise of single features
+/// does not. The largest of the four medians.
+double StandstillDetector::common_flow_px(const FeatureFrame& frame) {
+  for (auto& component : flow_) component.clear();
   for (const FeatureObservation& feature : frame.features) {
     const auto match = std::lower_bound(reference_.begin(), reference_.end(), feature.id,
                                         [](const FeatureObservation& o, std::uint64_t id) { return o.id < id; });
     if (match == reference_.end() || match->id != feature.id) continue;
-    flow_.push_back(focal_px_ * (feature.left - match->left).norm());
+    const Eigen::Vector2d flow = focal_px_ * (feature.left - match->left);
+    const Eigen::Vector2d outward = match->left.stableNormalized();
+    flow_[0].push_back(flow.x());
+    flow_[1].push_back(flow.y());
+    flow_[2].push_back(outward.dot(flow));
+    flow_[3].push_back(outward.x() * flow.y() - outward.y() * flow.x());
   }
-  if (flow_.size() < kMinCommonFeatures) return std::numeric_limits<double>::infinity();
-  const auto middle = flow_.begin() + static_cast<std::ptrdiff_t>(flow_.size() / 2);
-  std::nth_element(flow_.begin(), middle, flow_.end());
-  return *middle;
+  if (flow_[0].size() < kMinCommonFeatures) return std::numeric_limits<double>::infinity();
+  double largest = 0.0;
+  for (auto& component : flow_) {
+    const auto middle = component.begin() + static_cast<std::ptrdiff_t>(component.size() / 2);
+    std::nth_element(component.begin(), middle, component.end());
+    largest = std::max(largest, std::abs(*middle));
+  }
+  return largest;
 }
 
 }  // namespace ear

@@ -2,6 +2,7 @@
 // that glides at constant speed has a quiet IMU too.
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "ear/filter_config.h"
@@ -25,13 +26,13 @@ class StandstillDetector {
   static constexpr TimeNs kMoving = -1;
 
   void restart(const FeatureFrame& frame);
-  [[nodiscard]] double median_flow_px(const FeatureFrame& frame);
+  [[nodiscard]] double common_flow_px(const FeatureFrame& frame);
 
   StandstillConfig config_;
   double focal_px_;
   TimeNs since_ns_ = kMoving;                  ///< first frame of the present stillness
   std::vector<FeatureObservation> reference_;  ///< features of that frame, by ascending id
-  std::vector<double> flow_;
+  std::array<std::vector<double>, 4> flow_;
 };
 
 }  // namespace ear

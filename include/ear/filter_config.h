@@ -10,7 +10,7 @@ struct StandstillConfig {
   double max_gyro_at_start = 0.2;  ///< [rad/s] the same before the bias is known: the largest bias of any sensor
   double max_gyro_spread = 0.06;   ///< [rad/s] standard deviation of the samples over `duration`, vibration included
   double max_accel_spread = 0.6;   ///< [m/s^2] the same for the specific force
-  double max_flow_px = 0.3;        ///< [px] median motion of the features since the vehicle stopped
+  double max_flow_px = 0.3;        ///< [px] common motion of the features since the vehicle stopped
   double position_sigma = 1e-3;    ///< [m] how far a standing vehicle may shift
   double rotation_sigma = 5e-4;    ///< [rad]
   double velocity_sigma = 5e-3;    ///< [m/s]

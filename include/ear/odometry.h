@@ -69,7 +69,7 @@ struct InputCounts {
 
 /// Time spent in the last add_stereo [s].
 struct StageTimes {
-  double pyramid = 0.0, track = 0.0, detect = 0.0, stereo = 0.0, reject = 0.0, propagate = 0.0, update = 0.0;
+  double pyramid = 0.0, track = 0.0, detect = 0.0, stereo = 0.0, reject = 0.0, filter = 0.0;
 };
 
 class Odometry {
@@ -90,8 +90,8 @@ class Odometry {
   [[nodiscard]] std::optional<NavState> predict(TimeNs t_ns) const;
 
   [[nodiscard]] Status status() const;
-  [[nodiscard]] const InputCounts& input_counts() const;
-  [[nodiscard]] const StageTimes& stage_times() const;
+  [[nodiscard]] InputCounts input_counts() const;
+  [[nodiscard]] StageTimes stage_times() const;
 
   /// The calibration in use: what was given, with what was learned while running.
   [[nodiscard]] Calibration calibration() const;

@@ -1,0 +1,22 @@
+// A recording fed to the estimator, as its drivers would have done it.
+#pragma once
+
+#include <functional>
+#include <optional>
+
+#include "ear/odometry.h"
+#include "src/recording/recording.h"
+
+namespace ear::tools {
+
+/// What became of one stereo frame. `estimate` is empty while the estimator has not started.
+struct ReplayedFrame {
+  TimeNs t_ns = 0;
+  std::optional<Estimate> estimate;
+};
+
+/// Feeds every sample of the recording to `odometry`. A frame is handed over when the first inertial sample after it is
+/// in: images take longer to arrive than inertial samples. Calls `on_frame` after each.
+void replay(Recording& recording, Odometry& odometry, const std::function<void(const ReplayedFrame&)>& on_frame);
+
+}  // namespace ear::tools

@@ -1,0 +1,171 @@
+// ear run RECORDING: replays a recording through the estimator; writes the trajectory and what explains it.
+#include <opencv2/core/utility.hpp>
+
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "src/recording/config_file.h"
+#include "src/recording/input_error.h"
+#include "src/recording/recording.h"
+#include "src/recording/writers.h"
+#include "tools/commands.h"
+#include "tools/progress.h"
+#include "tools/replay.h"
+
+namespace ear::tools {
+namespace {
+
+struct RunArguments {
+  std::filesystem::path recording;
+  std::filesystem::path out = "ear-run";
+  std::filesystem::path config;
+  std::vector<std::filesystem::path> calibration;
+  double camera_rate_hz = 0.0;
+  bool mono = false;
+};
+
+/// What happened over the whole run.
+struct Totals {
+  std::uint64_t frames = 0;
+  std::uint64_t estimates = 0;
+  std::uint64_t standing = 0;
+  std::uint64_t features_used = 0;
+  std::uint64_t features_rejected = 0;
+  StageTimes times;
+
+  void add(const ReplayedFrame& frame, const StageTimes& stages) {
+    ++frames;
+    times.pyramid += stages.pyramid;
+    times.track += stages.track;
+    times.detect += stages.detect;
+    times.stereo += stages.stereo;
+    times.reject += stages.reject;
+    times.filter += stages.filter;
+    if (!frame.estimate) return;
+    ++estimates;
+    standing += frame.estimate->frame.standing ? 1 : 0;
+    features_used += static_cast<std::uint64_t>(frame.estimate->frame.features_used);
+    features_rejected += static_cast<std::uint64_t>(frame.estimate->frame.features_rejected);
+  }
+};
+
+const char* status_text(Status status) {
+  switch (status) {
+    case Status::waiting_for_imu:
+      return "waiting for inertial samples";
+    case Status::waiting_for_standstill:
+      return "cannot start yet: it starts from standing, and the vehicle moves";
+    case Status::tracking:
+      return "tracking";
+  }
+  return "";
+}
+
+std::string progress_line(const ReplayedFrame& frame, const Odometry& odometry, const TimeSpan& span,
+                          double wall_time) {
+  const double done = seconds_between(span.first_ns, frame.t_ns);
+  char line[200];
+  int length = std::snprintf(line, sizeof line, "%3.0f %%  %5.1f x real time  ",
+                             100.0 * done / seconds_between(span.first_ns, span.last_ns), done / wall_time);
+  const auto rest = sizeof line - static_cast<std::size_t>(length);
+  if (frame.estimate) {
+    const Eigen::Vector3d& p = frame.estimate->state.p_WB;
+    std::snprintf(line + length, rest, "position %7.2f %7.2f %6.2f m  tracks %3d  %s", p.x(), p.y(), p.z(),
+                  frame.estimate->frame.tracks, frame.estimate->frame.standing ? "standing" : "moving");
+  } else {
+    std::snprintf(line + length, rest, "%s", status_text(odometry.status()));
+  }
+  return line;
+}
+
+RunSummary summarize(const RunArguments& args, const Recording& recording, const Odometry& odometry,
+                     const Totals& totals, double wall_time) {
+  RunSummary summary;
+  const InputCounts inputs = odometry.input_counts();
+  summary.recording = args.recording.string();
+  summary.counts = {{"frames", totals.frames},
+                    {"estimates", totals.estimates},
+                    {"frames_standing", totals.standing},
+                    {"features_used", totals.features_used},
+                    {"features_rejected", totals.features_rejected},
+                    {"imu_rejected", inputs.imu_rejected},
+                    {"imu_gaps", inputs.imu_gaps},
+                    {"frames_rejected", inputs.frames_rejected},
+                    {"frames_without_imu", inputs.frames_without_imu}};
+  summary.duration_s = seconds_between(recording.span().first_ns, recording.span().last_ns);
+  summary.wall_time_s = wall_time;
+  const StageTimes& t = totals.times;
+  summary.stage_times_s = {{"pyramid", t.pyramid}, {"track", t.track},   {"detect", t.detect},
+                           {"stereo", t.stereo},   {"reject", t.reject}, {"filter", t.filter}};
+  summary.warnings = recording.warnings();
+  return summary;
+}
+
+void run(const RunArguments& args) {
+  cv::setNumThreads(1);  // the same result whatever the machine
+  const Config config = args.config.empty() ? Config{} : load_config(args.config);
+  RecordingOptions options;
+  options.calibration_files = args.calibration;
+  options.camera_rate_hz = args.camera_rate_hz;
+  options.mono = args.mono;
+  Recording recording(args.recording, options);
+  Odometry odometry(config, recording.calibration());
+
+  std::filesystem::create_directories(args.out);
+  TumWriter trajectory(args.out / "estimate.tum");
+  StatesWriter states(args.out / "states.csv");
+  save_config(config, args.out / "config.yaml");
+
+  Totals totals;
+  Progress progress;
+  const auto start = std::chrono::steady_clock::now();
+  const auto wall_time = [&] {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  };
+  replay(recording, odometry, [&](const ReplayedFrame& frame) {
+    totals.add(frame, odometry.stage_times());
+    if (frame.estimate) {
+      trajectory.write(*frame.estimate);
+      states.write(*frame.estimate);
+    }
+    progress.show(progress_line(frame, odometry, recording.span(), wall_time()));
+  });
+  progress.finish();
+  write_summary(summarize(args, recording, odometry, totals, wall_time()), args.out / "summary.json");
+
+  std::printf("%llu of %llu frames estimated, %.1f s of recording in %.1f s: %s\n",
+              static_cast<unsigned long long>(totals.estimates), static_cast<unsigned long long>(totals.frames),
+              seconds_between(recording.span().first_ns, recording.span().last_ns), wall_time(), args.out.c_str());
+  for (const Warning& warning : recording.warnings()) {
+    std::fprintf(stderr, "ear: warning: %s, %llu times, first at %s\n", warning.kind.c_str(),
+                 static_cast<unsigned long long>(warning.count), warning.first.c_str());
+  }
+  if (totals.estimates == 0) {
+    throw InputError(args.recording.string() + ": no estimate: " + status_text(odometry.status()));
+  }
+}
+
+}  // namespace
+
+void add_run_command(CLI::App& app) {
+  auto* command = app.add_subcommand("run", "Estimate the trajectory of a recording");
+  auto args = std::make_shared<RunArguments>();
+  command->add_option("RECORDING", args->recording, "Folder in the EuRoC/ASL layout (docs/recordings.md)")->required();
+  command->add_option("--out", args->out, "Folder for estimate.tum, states.csv, summary.json, config.yaml")
+      ->capture_default_str();
+  command->add_option("--config", args->config, "Settings; what it leaves out keeps its default")
+      ->check(CLI::ExistingFile);
+  command
+      ->add_option("--calibration", args->calibration,
+                   "Kalibr's camchain-imucam.yaml and imu.yaml, instead of sensor.yaml")
+      ->check(CLI::ExistingFile);
+  command->add_option("--camera-rate", args->camera_rate_hz, "Leave out frames to reach this rate [Hz]")
+      ->check(CLI::PositiveNumber);
+  command->add_flag("--mono", args->mono, "Ignore the right camera");
+  command->callback([args] { run(*args); });
+}
+
+}  // namespace ear::tools
