@@ -21,14 +21,14 @@ namespace {
 
 constexpr float kEdge_px = 8.0F;                // features closer to the image's edge are dropped
 constexpr float kMinTrackDistance_px = 5.0F;    // two tracks closer than this have become one
-constexpr double kFlowTolerance_px = 2.0;
+constexpr double kFlowTolerance_px = 1.0;
 constexpr double kDisparitySigma_px = 1.0;      // for the depth's part of that tolerance
 constexpr double kMapStep_px = 4.0;             // of the finite differences of a predicted affine map
 constexpr int kLevelMeasured = 0;               // where to begin: with depth and a motion measured in this frame,
 constexpr int kLevelPredicted = 2;              // with a predicted rotation,
 constexpr int kLevelUnknown = ImagePyramid::kMaxLevels - 1;  // and without
 constexpr std::size_t kProbes = 24;             // features that measure the motion for the others
-constexpr float kRefreshStretch = 1.6F;         // a feature that has grown or shrunk this much gets a new patch
+constexpr float kRefreshStretch = 1.3F;         // a feature that has grown or shrunk this much gets a new patch
 
 struct Track {
   std::uint64_t id = 0;

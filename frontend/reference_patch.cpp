@@ -11,8 +11,8 @@ constexpr float kCoarseSettled = 0.1F; // [px of the level]
 constexpr int kPositionSteps = 6;      // on the base level, before the affine map is freed
 constexpr float kPositionSettled = 0.25F;
 constexpr int kAffineSteps = 6;
-constexpr float kAffineSettled = 0.015F;
-constexpr float kMaxUnsettled = 0.15F;  // [px] a last step this long is still a match: noise keeps weak patches moving
+constexpr float kAffineSettled = 0.02F;
+constexpr float kMaxUnsettled = 0.1F;  // [px] a last step this long is still a match: noise keeps weak patches moving
 constexpr float kMinScale = 0.3F;       // of steps that overshoot
 constexpr float kMaxStretch = 2.5F;  // of the affine map: beyond, the patch is no longer what it was
 
@@ -75,7 +75,8 @@ std::optional<ReferencePatch::Match> ReferencePatch::align(const ImagePyramid& p
 
   const PatchLevel& base = levels_.front();
   const GreyLevel& image = pyramid.level(0);
-  const auto placed = settle(kPositionSteps, kPositionSettled,
+  // A start on the base level is close enough for the full step.
+  const auto placed = start_level == 0 ? std::optional<PatchLevel::Step>(PatchLevel::Step{}) : settle(kPositionSteps, kPositionSettled,
                              [&](float scale) { return base.step_position(image, scale, warp); });
   if (!placed) return std::nullopt;
   const auto settled = settle(kAffineSteps, kAffineSettled, [&](float scale) {
