@@ -19,7 +19,7 @@ foreach(part IN ITEMS ear filter frontend)
   install(TARGETS ${target} EXPORT ear ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}
                                        LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
 endforeach()
-if(TARGET ear_program)
+if(EAR_BUILD_TOOLS)
   install(TARGETS ear_program RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 endif()
 

@@ -30,7 +30,9 @@ class Layers(unittest.TestCase):
                     "filter/a.cpp": '#include "filter/a.h"\n#include "a.h"\n#include <ear/types.h>\n',
                     "frontend/a.cpp": "#include <opencv2/core.hpp>\n#include <thread>\n",
                     "src/a.cpp": '#include "filter/a.h"\n#include <spdlog/spdlog.h>\n',
-                    "tools/run.cpp": '#include "src/a.h"\n#include "tools/simulator/a.h"\n#include <CLI/CLI.hpp>\n',
+                    "src/a.h": "",
+                    "tools/simulator/b.h": "",
+                    "tools/run.cpp": '#include "src/a.h"\n#include "tools/simulator/b.h"\n#include <CLI/CLI.hpp>\n',
                     "tools/simulator/a.h": "// #include <frontend/a.h> is only talked about\n",
                     "tests/filter/a.cpp": '#include "filter/a.h"\n#include <doctest/doctest.h>\n',
                 }
@@ -57,6 +59,7 @@ class Layers(unittest.TestCase):
     def test_nothing_points_at_the_tools(self):
         self.assert_fault("src/a.cpp", '"tools/commands.h"', others=["tools/commands.h"])
         self.assert_fault("src/recording/a.cpp", '"filter/b.h"', others=["filter/b.h"])
+        self.assert_fault("src/a.cpp", '"src/recording/b.h"', others=["src/recording/b.h"])
 
     def test_truth_shares_no_code_with_the_models(self):
         for folder in ("filter", "frontend", "src", "tools/evaluation"):
