@@ -1,0 +1,75 @@
+#include <doctest/doctest.h>
+
+#include <opencv2/core.hpp>
+
+#include "frontend/detector.h"
+#include "scene.h"
+
+namespace ear {
+namespace {
+
+constexpr int kWanted = 100;
+
+ImagePyramid pyramid_of(const cv::Mat& image) {
+  ImagePyramid pyramid;
+  pyramid.build(view_of(image));
+  return pyramid;
+}
+
+std::vector<Eigen::Vector2f> pixels_of(const std::vector<Corner>& corners) {
+  std::vector<Eigen::Vector2f> pixels;
+  for (const Corner& corner : corners) pixels.push_back(corner.pixel);
+  return pixels;
+}
+
+}  // namespace
+
+TEST_CASE("detector: corners are spread over the image, and apart") {
+  Detector detector(320, 240, kWanted);
+  const auto corners = detector.detect(pyramid_of(random_texture(320, 240, 1)), {}, kWanted);
+  CHECK(corners.size() == kWanted);
+  CHECK(detector.coverage(pixels_of(corners)) > 0.85);
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    for (std::size_t j = 0; j < i; ++j) CHECK((corners[i].pixel - corners[j].pixel).norm() >= 10.0F);
+  }
+}
+
+TEST_CASE("detector: holes are filled first, what is taken is left alone") {
+  Detector detector(320, 240, kWanted);
+  const ImagePyramid image = pyramid_of(random_texture(320, 240, 2));
+  std::vector<Eigen::Vector2f> taken;
+  for (float v = 14.0F; v < 240.0F; v += 28.0F) {
+    for (float u = 14.0F; u < 160.0F; u += 28.0F) taken.emplace_back(u, v);
+  }
+  const auto corners = detector.detect(image, taken, 40);
+  REQUIRE(corners.size() == 40);
+  int in_the_hole = 0;
+  for (const Corner& corner : corners) {
+    in_the_hole += corner.pixel.x() > 150.0F ? 1 : 0;
+    for (const auto& t : taken) CHECK((corner.pixel - t).norm() >= 10.0F);
+  }
+  CHECK(in_the_hole >= 36);
+}
+
+TEST_CASE("detector: weak texture still gives corners, none gives none") {
+  Detector detector(320, 240, kWanted);
+  CHECK(detector.detect(pyramid_of(random_texture(320, 240, 3, 0.3)), {}, kWanted).size() > 50);
+  for (const int grey : {0, 128, 255}) {
+    CHECK(detector.detect(pyramid_of(cv::Mat(240, 320, CV_8U, cv::Scalar(grey))), {}, kWanted).empty());
+  }
+}
+
+TEST_CASE("detector: in half an image of texture, textured cells give more") {
+  cv::Mat image = random_texture(320, 240, 4);
+  image(cv::Rect(0, 0, 320, 120)).setTo(100);
+  Detector detector(320, 240, kWanted);
+  CHECK(detector.detect(pyramid_of(image), {}, kWanted).size() > 70);
+}
+
+TEST_CASE("detector: nothing wanted, nothing found") {
+  Detector detector(320, 240, kWanted);
+  CHECK(detector.detect(pyramid_of(random_texture(320, 240, 5)), {}, 0).empty());
+  CHECK(detector.detect(pyramid_of(random_texture(320, 240, 5)), {}, -3).empty());
+}
+
+}  // namespace ear

@@ -1,0 +1,302 @@
+#include "frontend/frontend.h"
+
+#include <doctest/doctest.h>
+
+#include <cmath>
+#include <map>
+#include <opencv2/core.hpp>
+#include <opencv2/core/utility.hpp>
+#include <set>
+#include <stdexcept>
+
+#include "scene.h"
+
+namespace ear {
+namespace {
+
+constexpr double kNoise = 2.0;  // [grey values]
+constexpr int kFeatures = 80;
+
+enum class Known { nothing, rotation, motion };
+
+// A stereo vehicle in a scene. Drives the front end along poses and compares what it sees with where things are.
+class Run {
+ public:
+  explicit Run(std::vector<TexturedRectangle> scene, std::vector<CameraCalibration> cameras = test_stereo_pair())
+      : scene_(std::move(scene)), cameras_(std::move(cameras)), frontend_({kFeatures, 0.3}, cameras_) {
+    for (const CameraCalibration& camera : cameras_) renderers_.emplace_back(camera);
+  }
+
+  const FeatureFrame& step(const Eigen::Isometry3d& T_WB, Known known, bool with_right = true) {
+    MotionPrediction prediction;
+    if (known != Known::nothing && frames_ > 0) {
+      prediction = exact_motion(T_WB_, T_WB);
+      prediction.translation_known = known == Known::motion;
+    }
+    cv::Mat left = renderers_[0].render(T_WB, scene_);
+    add_noise(left, kNoise, random_);
+    cv::Mat right;
+    if (with_right && cameras_.size() > 1) {
+      right = renderers_[1].render(T_WB, scene_);
+      add_noise(right, kNoise, random_);
+    }
+    T_WB_ = T_WB;
+    ++frames_;
+    const FeatureFrame& frame = frontend_.process({frames_ * 100'000'000, view_of(left), view_of(right)}, prediction);
+    compare(frame);
+    return frame;
+  }
+
+  Frontend& frontend() { return frontend_; }
+  std::vector<TexturedRectangle>& scene() { return scene_; }
+
+  // Error of features seen before, against the place that they had when first seen [px].
+  [[nodiscard]] double rms_px() const { return std::sqrt(squares_ / std::max(1, count_)); }
+  [[nodiscard]] double stereo_rms_px() const { return std::sqrt(stereo_squares_ / std::max(1, stereo_count_)); }
+  [[nodiscard]] double wrong_share() const { return static_cast<double>(wrong_) / std::max(1, count_ + wrong_); }
+  [[nodiscard]] double wrong_stereo_share() const {
+    return static_cast<double>(stereo_wrong_) / std::max(1, stereo_count_ + stereo_wrong_);
+  }
+  [[nodiscard]] int compared() const { return count_; }
+
+ private:
+  void compare(const FeatureFrame& frame) {
+    const Eigen::Isometry3d T_WC = T_WB_ * cameras_[0].T_BC;
+    for (const FeatureObservation& feature : frame.features) {
+      const auto known = places_.find(feature.id);
+      if (known == places_.end()) {
+        if (const auto place = hit(T_WC, feature.left, scene_)) places_[feature.id] = *place;
+        continue;
+      }
+      const auto seen = [&](const CameraCalibration& camera) -> Eigen::Vector2d {
+        return ((T_WB_ * camera.T_BC).inverse() * known->second).hnormalized();
+      };
+      const double error = cameras_[0].fu * (feature.left - seen(cameras_[0])).norm();
+      if (error > 2.0) {
+        ++wrong_;
+      } else {
+        squares_ += error * error;
+        ++count_;
+      }
+      if (!feature.has_right) continue;
+      const double stereo_error = cameras_[1].fu * (feature.right - seen(cameras_[1])).norm();
+      if (stereo_error > 2.0) {
+        ++stereo_wrong_;
+      } else {
+        stereo_squares_ += stereo_error * stereo_error;
+        ++stereo_count_;
+      }
+    }
+  }
+
+  std::vector<TexturedRectangle> scene_;
+  std::vector<CameraCalibration> cameras_;
+  std::vector<Camera> renderers_;
+  Frontend frontend_;
+  std::mt19937 random_{11};
+  Eigen::Isometry3d T_WB_ = Eigen::Isometry3d::Identity();
+  std::int64_t frames_ = 0;
+  std::map<std::uint64_t, Eigen::Vector3d> places_;
+  double squares_ = 0.0, stereo_squares_ = 0.0;
+  int count_ = 0, wrong_ = 0, stereo_count_ = 0, stereo_wrong_ = 0;
+};
+
+Eigen::Isometry3d at(const Eigen::Vector3d& p, double roll = 0.0, double yaw = 0.0) {
+  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+  T.translation() = p;
+  T.linear() = (Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitY()) * Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitZ()))
+                   .toRotationMatrix();
+  return T;
+}
+
+}  // namespace
+
+TEST_CASE("front end: features stay where they are while the camera moves on all axes") {
+  for (const LensModel lens : {LensModel::radial_tangential, LensModel::equidistant}) {
+    Run run({wall(2.0, 20)}, test_stereo_pair(lens));
+    for (int i = 0; i < 12; ++i) {
+      const FeatureFrame& frame =
+          run.step(at({0.03 * i, 0.01 * i, 0.05 * i}, 0.02 * i, 0.01 * std::sin(i)), Known::motion);
+      CHECK(frame.features.size() > 60);
+      CHECK(run.frontend().quality().stereo > 0.8 * static_cast<double>(frame.features.size()));
+    }
+    CHECK(run.compared() > 600);
+    CHECK(run.rms_px() < 0.1);
+    CHECK(run.stereo_rms_px() < 0.12);
+    CHECK(run.wrong_share() < 0.005);
+    CHECK(run.wrong_stereo_share() < 0.005);
+  }
+}
+
+TEST_CASE("front end: turns of more than 10 degrees from frame to frame, with the gyroscope") {
+  for (const bool roll : {false, true}) {
+    CAPTURE(roll);
+    Run run({wall(2.0, 21)});
+    run.step(at({0, 0, 0}), Known::rotation);
+    for (const int i : {1, 2, 3, 2, 1, 0}) {
+      const double angle = 0.21 * i;  // 12 degrees
+      run.step(roll ? at({0, 0, 0}, angle) : at({0, 0, 0}, 0.0, 0.5 * angle), Known::rotation);
+      CHECK(run.frontend().quality().tracked > 30);
+    }
+    CHECK(run.rms_px() < 0.15);
+    CHECK(run.wrong_share() < 0.01);
+  }
+}
+
+TEST_CASE("front end: large motion over near ground is followed with depth and prediction") {
+  // 0.2 m towards and along a wall at 0.9 m: flow up to 60 px.
+  const auto poses = [](int i) { return at({0.2 * i, 0.02 * i, 0.05 * i}); };
+  const auto tracked = [&](Known known) {
+    Run run({wall(0.9, 22)});
+    int sum = 0;
+    for (int i = 0; i < 4; ++i) {
+      run.step(poses(i), known);
+      sum += run.frontend().quality().tracked;
+    }
+    CHECK(run.wrong_share() < 0.02);
+    return sum;
+  };
+  const int with_motion = tracked(Known::motion);
+  const int with_nothing = tracked(Known::nothing);
+  CHECK(with_motion > 110);
+  CHECK(with_nothing < with_motion / 2);
+}
+
+TEST_CASE("front end: slow motion needs no prediction") {
+  Run run({wall(2.0, 23)});
+  for (int i = 0; i < 6; ++i) run.step(at({0.04 * i, 0.0, 0.0}), Known::nothing);
+  CHECK(run.frontend().quality().tracked > 60);
+  CHECK(run.rms_px() < 0.1);
+}
+
+TEST_CASE("front end: what moves by itself is not kept") {
+  TexturedRectangle box = wall(1.2, 24);
+  box.texture = box.texture(cv::Rect(0, 0, 120, 110)).clone();
+  box.corner_W = {-0.2, -0.2, 1.2};
+  Run run({wall(2.0, 25), box});
+  int on_box = 0;
+  for (int i = 0; i < 6; ++i) {
+    run.scene()[1].corner_W = {-0.2 + 0.04 * i, -0.2 + 0.03 * i, 1.2};
+    const FeatureFrame& frame = run.step(at({0.02 * i, 0.0, 0.0}), Known::motion);
+    const int detected = run.frontend().quality().detected;
+    // Features that survive the step: all but the newest, which come last.
+    for (std::size_t k = 0; i > 0 && k + static_cast<std::size_t>(detected) < frame.features.size(); ++k) {
+      const auto place = hit(at({0.02 * i, 0.0, 0.0}), frame.features[k].left, run.scene());
+      // Well inside the box; on its edges a patch may belong to the wall.
+      if (!place || std::abs(place->z() - 1.2) > 1e-6) continue;
+      const Eigen::Vector3d in = *place - run.scene()[1].corner_W;
+      if (in.x() > 0.06 && in.y() > 0.06 && in.x() < 0.5 && in.y() < 0.45) ++on_box;
+    }
+  }
+  CHECK(on_box <= 2);
+}
+
+TEST_CASE("front end: one camera, or one image, is enough") {
+  SUBCASE("one camera") {
+    auto cameras = test_stereo_pair();
+    cameras.pop_back();
+    for (const Known known : {Known::motion, Known::rotation, Known::nothing}) {
+      Run run({wall(2.0, 26)}, cameras);
+      for (int i = 0; i < 6; ++i) {
+        const FeatureFrame& frame = run.step(at({0.03 * i, 0.0, 0.02 * i}, 0.02 * i), known);
+        for (const auto& feature : frame.features) CHECK_FALSE(feature.has_right);
+      }
+      CHECK(run.frontend().quality().tracked > 60);
+      CHECK(run.rms_px() < 0.1);
+    }
+  }
+  SUBCASE("the right image is missing for a while") {
+    Run run({wall(2.0, 27)});
+    for (int i = 0; i < 8; ++i) {
+      const bool there = i < 3 || i > 5;
+      run.step(at({0.03 * i, 0.0, 0.0}), Known::motion, there);
+      CHECK((run.frontend().quality().stereo > 50) == there);
+      if (i > 0) CHECK(run.frontend().quality().tracked > 60);
+    }
+    CHECK(run.wrong_stereo_share() < 0.005);
+  }
+}
+
+TEST_CASE("front end: black, white and returning images") {
+  const auto cameras = test_stereo_pair();
+  Frontend frontend({kFeatures, 0.3}, cameras);
+  const cv::Mat scene = Camera(cameras[0]).render(at({0, 0, 0}), {wall(2.0, 28)});
+  const cv::Mat other = Camera(cameras[1]).render(at({0, 0, 0}), {wall(2.0, 28)});
+  std::set<std::uint64_t> first;
+  for (const auto& feature : frontend.process({0, view_of(scene), view_of(other)}, {}).features) first.insert(feature.id);
+  CHECK(first.size() == kFeatures);
+  CHECK(frontend.quality().brightness == doctest::Approx(cv::mean(scene)[0]).epsilon(0.02));
+  CHECK(frontend.quality().sharpness > 10.0);
+  CHECK(frontend.quality().coverage > 0.7);
+  TimeNs t = 1;
+  for (const int grey : {0, 255}) {
+    const cv::Mat flat(240, 320, CV_8U, cv::Scalar(grey));
+    CHECK(frontend.process({t++, view_of(flat), view_of(flat)}, {}).features.empty());
+    CHECK(frontend.quality().brightness == doctest::Approx(grey));
+    CHECK(frontend.quality().sharpness == doctest::Approx(0.0));
+    CHECK(frontend.quality().coverage == doctest::Approx(0.0));
+  }
+  const FeatureFrame& back = frontend.process({t, view_of(scene), view_of(other)}, {});
+  CHECK(back.features.size() == kFeatures);
+  for (const auto& feature : back.features) CHECK(first.count(feature.id) == 0);
+}
+
+TEST_CASE("front end: ids are unique in a frame and never come back, also after reset") {
+  Run run({wall(2.0, 29)});
+  std::set<std::uint64_t> gone;
+  std::set<std::uint64_t> last;
+  for (int i = 0; i < 8; ++i) {
+    if (i == 5) run.frontend().reset();
+    std::set<std::uint64_t> now;
+    for (const auto& feature : run.step(at({0.15 * i, 0.0, 0.0}), Known::motion).features) {
+      CHECK(now.insert(feature.id).second);
+      CHECK(gone.count(feature.id) == 0);
+    }
+    for (const auto id : last) {
+      if (now.count(id) == 0) gone.insert(id);
+    }
+    if (i == 5) CHECK(run.frontend().quality().tracked == 0);
+    last = now;
+  }
+  CHECK(gone.size() > 50);
+}
+
+TEST_CASE("front end: images that do not fit the calibration are refused, and change nothing") {
+  const auto cameras = test_stereo_pair();
+  Frontend frontend({kFeatures, 0.3}, cameras);
+  const cv::Mat good = Camera(cameras[0]).render(at({0, 0, 0}), {wall(2.0, 30)});
+  const cv::Mat small = good(cv::Rect(0, 0, 300, 240));
+  frontend.process({0, view_of(good), {}}, {});
+  CHECK_THROWS_AS(frontend.process({1, view_of(small), view_of(good)}, {}), std::invalid_argument);
+  CHECK_THROWS_AS(frontend.process({1, view_of(good), view_of(small)}, {}), std::invalid_argument);
+  CHECK_THROWS_AS(frontend.process({1, {}, view_of(good)}, {}), std::invalid_argument);
+  frontend.process({2, view_of(good), {}}, {});
+  CHECK(frontend.quality().tracked == kFeatures);
+  CHECK_THROWS_AS(Frontend({kFeatures, 0.3}, {}), std::invalid_argument);
+  CHECK_THROWS_AS(Frontend({0, 0.3}, cameras), std::invalid_argument);
+  CHECK_THROWS_AS(Frontend({kFeatures, 0.0}, cameras), std::invalid_argument);
+}
+
+TEST_CASE("front end: the same images give the same features, whatever the number of threads") {
+  const auto features = [](int threads) {
+    const int before = cv::getNumThreads();
+    cv::setNumThreads(threads);
+    TexturedRectangle box = wall(1.0, 32);
+    box.texture = box.texture(cv::Rect(0, 0, 100, 100)).clone();
+    Run run({wall(2.0, 31), box});
+    std::vector<double> all;
+    for (int i = 0; i < 5; ++i) {
+      for (const auto& f : run.step(at({0.1 * i, 0.0, 0.0}), Known::nothing).features) {
+        all.insert(all.end(), {static_cast<double>(f.id), f.left.x(), f.left.y(), f.right.x(), f.right.y()});
+      }
+    }
+    cv::setNumThreads(before);
+    return all;
+  };
+  const std::vector<double> one = features(1);
+  CHECK(one.size() > 1000);
+  CHECK(one == features(1));
+  CHECK(one == features(4));
+}
+
+}  // namespace ear

@@ -1,0 +1,120 @@
+#include <doctest/doctest.h>
+
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+#include <random>
+
+#include "frontend/image_pyramid.h"
+#include "frontend/reference_patch.h"
+#include "scene.h"
+
+namespace ear {
+namespace {
+
+// The image moved so that what was at x is at A x + t; sharp texture, interpolated well.
+cv::Mat warped(const cv::Mat& image, const Eigen::Matrix2f& affine, const Eigen::Vector2f& shift) {
+  const cv::Matx23f m(affine(0, 0), affine(0, 1), shift.x(), affine(1, 0), affine(1, 1), shift.y());
+  cv::Mat out;
+  cv::warpAffine(image, out, m, image.size(), cv::INTER_LANCZOS4, cv::BORDER_REFLECT_101);
+  return out;
+}
+
+ImagePyramid pyramid_of(const cv::Mat& image) {
+  ImagePyramid pyramid;
+  pyramid.build(view_of(image));
+  return pyramid;
+}
+
+}  // namespace
+
+TEST_CASE("pyramid: levels halve the image, and its border mirrors it") {
+  const ImagePyramid pyramid = pyramid_of(random_texture(320, 240, 1));
+  REQUIRE(pyramid.top_level() == 3);
+  CHECK(pyramid.level(3).width == 40);
+  CHECK(pyramid.level(3).height == 30);
+  const GreyLevel& level = pyramid.level(1);
+  CHECK(*(level.origin - 5) == level.origin[5]);
+  CHECK(*(level.origin - 7 * level.stride) == level.origin[7 * level.stride]);
+}
+
+TEST_CASE("pyramid: an image too small for all levels has fewer") {
+  CHECK(pyramid_of(random_texture(40, 40, 1)).top_level() < 3);
+}
+
+TEST_CASE("patch: a shift is found to a few hundredths of a pixel, from pixels away, whatever the exposure") {
+  const cv::Mat image = random_texture(320, 240, 2);
+  const ImagePyramid before = pyramid_of(image);
+  std::mt19937 random(3);
+  std::uniform_real_distribution<float> uniform(-1.0F, 1.0F);
+  double squares = 0.0;
+  int count = 0;
+  for (int trial = 0; trial < 20; ++trial) {
+    CAPTURE(trial);
+    const Eigen::Vector2f shift(12.0F * uniform(random), 12.0F * uniform(random));
+    cv::Mat moved = warped(image, Eigen::Matrix2f::Identity(), shift);
+    moved.convertTo(moved, CV_8U, 0.7, 20.0);
+    add_noise(moved, 2.0, random);
+    const ImagePyramid after = pyramid_of(moved);
+    for (const float u : {80.5F, 160.5F, 240.5F}) {
+      const Eigen::Vector2f at(u, 120.5F);
+      ReferencePatch patch;
+      REQUIRE(patch.capture(before, at));
+      const auto match = patch.align(after, {at, Eigen::Matrix2f::Identity()}, 3);
+      REQUIRE(match);
+      const float error = (match->warp.centre - at - shift).norm();
+      CHECK(error < 0.15F);
+      squares += error * error;
+      ++count;
+      CHECK(match->correlation > 0.9F);
+    }
+  }
+  CHECK(std::sqrt(squares / count) < 0.05);
+}
+
+TEST_CASE("patch: turn, stretch and shear are found along with the position") {
+  const cv::Mat image = random_texture(320, 240, 4);
+  const ImagePyramid before = pyramid_of(image);
+  Eigen::Matrix2f affine;
+  affine << 1.12F, 0.08F, -0.10F, 0.95F;
+  const Eigen::Vector2f at(160.5F, 120.5F);
+  const Eigen::Vector2f to(161.3F, 119.9F);
+  const ImagePyramid after = pyramid_of(warped(image, affine, to - affine * at));
+  ReferencePatch patch;
+  REQUIRE(patch.capture(before, at));
+  const auto match = patch.align(after, {at, Eigen::Matrix2f::Identity()}, 0);
+  REQUIRE(match);
+  CHECK((match->warp.centre - to).norm() < 0.05F);
+  CHECK((match->warp.affine - affine).norm() < 0.04F);
+}
+
+TEST_CASE("patch: what the patch does not show stays as it was known") {
+  // Texture in one direction only: a capture without a corner is refused or keeps to its prior, but never runs away.
+  cv::Mat stripes(240, 320, CV_8U);
+  for (int row = 0; row < stripes.rows; ++row) {
+    for (int column = 0; column < stripes.cols; ++column) {
+      stripes.at<std::uint8_t>(row, column) = static_cast<std::uint8_t>(128.0 + 60.0 * std::sin(0.4 * column));
+    }
+  }
+  ReferencePatch patch;
+  CHECK_FALSE(patch.capture(pyramid_of(stripes), {160.5F, 120.5F}));
+}
+
+TEST_CASE("patch: no texture, no patch; no likeness, no match; outside, nothing") {
+  const ImagePyramid flat = pyramid_of(cv::Mat(240, 320, CV_8U, cv::Scalar(90)));
+  const ImagePyramid textured = pyramid_of(random_texture(320, 240, 5));
+  const ImagePyramid other = pyramid_of(random_texture(320, 240, 6));
+  const Eigen::Vector2f at(100.5F, 100.5F);
+  ReferencePatch patch;
+  CHECK_FALSE(patch.capture(flat, at));
+  REQUIRE(patch.capture(textured, at));
+  const Warp here{at, Eigen::Matrix2f::Identity()};
+  CHECK_FALSE(patch.align(flat, here, 3));
+  CHECK_FALSE(patch.align(other, here, 0));
+  CHECK_FALSE(patch.align(textured, {{-200.0F, 50.0F}, Eigen::Matrix2f::Identity()}, 3));
+  const float nan = std::nanf("");
+  CHECK_FALSE(patch.align(textured, {{nan, nan}, Eigen::Matrix2f::Identity()}, 3));
+  CHECK_FALSE(patch.align(textured, {at, nan * Eigen::Matrix2f::Identity()}, 3));
+  CHECK_FALSE(patch.capture(textured, {1000.0F, 10.0F}));
+}
+
+}  // namespace ear
