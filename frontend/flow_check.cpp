@@ -183,7 +183,9 @@ Flags essential_inliers(const std::vector<Flow>& flows, double tolerance) {
 }  // namespace
 
 Consensus FlowCheck::find(const std::vector<Flow>& flows, const MotionGuess& guess) {
-  if (flows.size() < kMinFlows) return {Flags(flows.size(), 1), guess.motion, false};
+  if (flows.size() < kMinFlows) {
+    return {Flags(flows.size(), std::uint8_t{guess.rotation_known}), guess.motion, false};
+  }
   std::vector<std::size_t> with_depth;
   for (std::size_t i = 0; i < flows.size(); ++i) {
     if (flows[i].has_depth) with_depth.push_back(i);
@@ -234,6 +236,7 @@ Consensus FlowCheck::find(const std::vector<Flow>& flows, const MotionGuess& gue
     const std::size_t inliers = count(flags);
     if (inliers >= best.inliers) best = {*refined, std::move(flags), inliers};
   }
+  if (best.inliers < kMinFlows) return {Flags(flows.size(), 0), guess.motion, false};
   return {best.flags, best.motion, best.inliers >= kMinDepths && 2 * best.inliers > flows.size()};
 }
 

@@ -40,7 +40,7 @@ class FlowCheck {
   /// `tolerance`: distance in normalized coordinates at which a feature stops being static.
   explicit FlowCheck(double tolerance) : tolerance_(tolerance) {}
 
-  /// With too few flows to tell, all are inliers and the motion is the guess.
+  /// With too few flows to tell, the motion is the guess; all are inliers if its rotation is known, else none is.
   [[nodiscard]] Consensus find(const std::vector<Flow>& flows, const MotionGuess& guess);
 
  private:

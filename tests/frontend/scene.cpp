@@ -164,8 +164,8 @@ MotionPrediction exact_motion(const Eigen::Isometry3d& T_WB0, const Eigen::Isome
 TexturedRectangle wall(double distance, unsigned seed) {
   TexturedRectangle rectangle;
   rectangle.metres_per_texel = 0.004 * distance;  // about a pixel of the test cameras
-  rectangle.texture = random_texture(1600, 1200, seed);
-  rectangle.corner_W = Eigen::Vector3d(-800.0 * rectangle.metres_per_texel, -600.0 * rectangle.metres_per_texel, distance);
+  rectangle.texture = random_texture(1000, 800, seed);
+  rectangle.corner_W = Eigen::Vector3d(-500.0 * rectangle.metres_per_texel, -400.0 * rectangle.metres_per_texel, distance);
   return rectangle;
 }
 

@@ -55,7 +55,7 @@ ImageView view_of(const cv::Mat& image);
 /// The exact motion between two poses of the body, as a prediction.
 MotionPrediction exact_motion(const Eigen::Isometry3d& T_WB0, const Eigen::Isometry3d& T_WB1);
 
-/// A wall of 8 x 6 m, `distance` in front of the origin and facing it.
+/// A wall facing the origin, `distance` [m] before it, four times as wide and 3.2 times as high as that.
 TexturedRectangle wall(double distance, unsigned seed);
 
 }  // namespace ear

@@ -126,9 +126,10 @@ TEST_CASE("flow check: a camera that stands or only turns keeps all of a static 
 TEST_CASE("flow check: too few flows say nothing") {
   Example example = make_example(true, 0.0, {0.1, 0.0, 0.0}, 4);
   example.flows.resize(5);
-  const Consensus c = FlowCheck(kPixel).find(example.flows, {});
-  CHECK(c.inliers == std::vector<std::uint8_t>(5, 1));
-  CHECK_FALSE(c.metric);
+  const Consensus unknown = FlowCheck(kPixel).find(example.flows, {});
+  CHECK(unknown.inliers == std::vector<std::uint8_t>(5, 0));
+  CHECK_FALSE(unknown.metric);
+  CHECK(FlowCheck(kPixel).find(example.flows, {{}, true, false}).inliers == std::vector<std::uint8_t>(5, 1));
   CHECK(FlowCheck(kPixel).find({}, {}).inliers.empty());
 }
 

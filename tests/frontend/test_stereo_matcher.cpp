@@ -95,20 +95,20 @@ TEST_CASE("stereo: points are found from near to far, with both lenses") {
 TEST_CASE("stereo: on a floor that runs away from the camera") {
   TexturedRectangle floor;
   floor.metres_per_texel = 0.002;
-  floor.texture = random_texture(1600, 1600, 9);
-  floor.corner_W = {-1.6, 0.25, 0.1};
+  floor.texture = random_texture(1000, 1000, 9);
+  floor.corner_W = {-1.0, 0.25, 0.1};
   floor.along_v_W = Eigen::Vector3d::UnitZ();
   const Result result = search_all(Pair({floor}));
   CHECK(result.tried > 30);
-  CHECK(result.found > 0.75 * result.tried);
+  CHECK(result.found > 0.7 * result.tried);
   CHECK(result.wrong <= 1);
   CHECK(result.error_px < 0.3);
 }
 
 TEST_CASE("stereo: texture that repeats along the line is rather left out than guessed") {
   TexturedRectangle tiles = wall(1.0, 10);
-  const cv::Mat tile = tiles.texture(cv::Rect(0, 0, 24, 1200)).clone();
-  for (int u = 0; u + 24 <= tiles.texture.cols; u += 24) tile.copyTo(tiles.texture(cv::Rect(u, 0, 24, 1200)));
+  const cv::Mat tile = tiles.texture(cv::Rect(0, 0, 24, 800)).clone();
+  for (int u = 0; u + 24 <= tiles.texture.cols; u += 24) tile.copyTo(tiles.texture(cv::Rect(u, 0, 24, 800)));
   const Result result = search_all(Pair({tiles}));
   CHECK(result.tried > 30);
   CHECK(result.wrong < 0.15 * result.tried);
