@@ -1,5 +1,6 @@
 #include "src/recording/rows.h"
 
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -46,11 +47,14 @@ std::int64_t count(const CsvRow& row, std::size_t index, const char* column) {
 }  // namespace
 
 ImuSample parse_imu_row(const CsvRow& row) {
-  require_columns(row, 7);
+  constexpr std::array kColumns{"w_x", "w_y", "w_z", "a_x", "a_y", "a_z"};
+  require_columns(row, 1 + kColumns.size());
   ImuSample sample;
   sample.t_ns = stamp(row);
-  sample.gyro_B << finite_number(row, 1, "w_x"), finite_number(row, 2, "w_y"), finite_number(row, 3, "w_z");
-  sample.accel_B << finite_number(row, 4, "a_x"), finite_number(row, 5, "a_y"), finite_number(row, 6, "a_z");
+  for (std::size_t i = 0; i < kColumns.size(); ++i) {
+    Eigen::Vector3d& vector = i < 3 ? sample.gyro_B : sample.accel_B;
+    vector(static_cast<Eigen::Index>(i % 3)) = finite_number(row, 1 + i, kColumns[i]);
+  }
   return sample;
 }
 

@@ -172,15 +172,16 @@ TEST_CASE("calibration: poses of another body are turned into the IMU's frame, w
   const TempFolder folder;
   write_full_recording(folder.path());
   const Calibration before = load(folder.path());
-  // The IMU sits 0.2 m ahead of the body of the files and is turned by 90 degrees about z.
-  replace_in(folder / "imu0/sensor.yaml", "[1,0,0,0, 0,1,0,0,", "[0,-1,0,0.2, 1,0,0,0,");
+  // The IMU sits 0.2 m ahead of the body of the files and is turned by 90 degrees about y.
+  replace_in(folder / "imu0/sensor.yaml", "[1,0,0,0, 0,1,0,0,", "[0,0,1,0.2, 0,1,0,0,");
+  replace_in(folder / "imu0/sensor.yaml", "0,0,1,0, 0,0,0,1]", "-1,0,0,0, 0,0,0,1]");
   Warnings warnings;
   const Calibration after = load_calibration(folder.path(), {}, warnings);
   CHECK(warnings.list().size() == 1);
 
   Eigen::Isometry3d T_FB = Eigen::Isometry3d::Identity();
   T_FB.translation().x() = 0.2;
-  T_FB.linear() << 0, -1, 0, 1, 0, 0, 0, 0, 1;
+  T_FB.linear() << 0, 0, 1, 0, 1, 0, -1, 0, 0;
   CHECK((T_FB * after.cameras[0].T_BC).isApprox(before.cameras[0].T_BC));
   CHECK((T_FB * after.encoder->T_BO).isApprox(before.encoder->T_BO));
   CHECK((T_FB * after.lasers->beams[0].p_BL).isApprox(before.lasers->beams[0].p_BL));

@@ -317,6 +317,7 @@ TEST_CASE("recording: left and right belong together by time") {
   const Contents all = read_all(folder.path());
   REQUIRE(all.frames.size() == 4);
   CHECK(all.frames[1].t_ns == 100'000'000);
+  REQUIRE_FALSE(all.frames[1].right.empty());
   CHECK(all.frames[1].right.data[0] == 1);
   CHECK(all.frames[2].right.empty());
   CHECK(all.frames[3].right.data[0] == 3);
