@@ -11,6 +11,7 @@ int main(int argc, char** argv) {
   ear::tools::add_run_command(app);
   ear::tools::add_evaluate_command(app);
   ear::tools::add_check_command(app);
+  ear::tools::add_bench_command(app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
