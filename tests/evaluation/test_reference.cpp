@@ -90,10 +90,12 @@ Json reference(const std::filesystem::path& estimate, const std::filesystem::pat
 void compare(const Json& expected, const Json& actual, const std::string& where) {
   CAPTURE(where);
   if (expected.is_object()) {
-    for (const auto& [key, value] : expected.items()) {
-      CAPTURE(key);
-      REQUIRE(actual.contains(key));
-      compare(value, actual[key], where + "/" + key);
+    for (const auto& item : expected.items()) {
+      std::string path = where;
+      path.append("/").append(item.key());
+      CAPTURE(path);
+      REQUIRE(actual.contains(item.key()));
+      compare(item.value(), actual[item.key()], path);
     }
   } else if (expected.is_array()) {
     REQUIRE(actual.size() == expected.size());

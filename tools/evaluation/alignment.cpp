@@ -51,8 +51,8 @@ Eigen::Matrix3d rotation_from_attitude(AlignmentKind kind, const Trajectory& est
     sum += (truth[i].q_WB * estimate[i].q_WB.conjugate()).toRotationMatrix();
   if (kind != AlignmentKind::se3) return rotation_about_z(std::atan2(sum(1, 0) - sum(0, 1), sum(0, 0) + sum(1, 1)));
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(sum, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Eigen::Matrix3d U = svd.matrixU();
-  const Eigen::Matrix3d V = svd.matrixV();
+  const Eigen::Matrix3d& U = svd.matrixU();
+  const Eigen::Matrix3d& V = svd.matrixV();
   return U * Eigen::Vector3d(1.0, 1.0, (U * V.transpose()).determinant()).asDiagonal() * V.transpose();
 }
 

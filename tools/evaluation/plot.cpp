@@ -94,7 +94,7 @@ std::string axes(const Plot& plot, const Scale& s) {
       out += line("grid", s.left, y, s.right, y) + text("tick end", s.left - 6.0, y + 4.0, ten_to_the(e));
     }
   } else {
-    for (const double y : ticks(plot.y_range, static_cast<int>((s.bottom - s.top) / 32.0)))
+    for (const double y : ticks(plot.y_range, static_cast<int>((s.bottom - s.top) / 24.0)))
       out += line(y == 0.0 ? "grid zero" : "grid", s.left, s.y(y), s.right, s.y(y)) +
              text("tick end", s.left - 6.0, s.y(y) + 4.0, number(y));
   }

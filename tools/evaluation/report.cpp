@@ -246,6 +246,7 @@ std::string trajectory_section(const Trajectory& truth, const std::vector<Report
 std::string position_section(const Trajectory& truth, const std::vector<ReportEntry>& entries, const Range& time) {
   const std::vector<std::string> labels{"x [m]", "y [m]", "z [m]"};
   std::vector<Plot> plots;
+  plots.reserve(labels.size());
   for (int axis = 0; axis < 3; ++axis)
     plots.push_back(error_panel(
         labels[static_cast<std::size_t>(axis)], truth, entries, time,
@@ -261,6 +262,7 @@ std::string position_section(const Trajectory& truth, const std::vector<ReportEn
 std::string rotation_section(const Trajectory& truth, const std::vector<ReportEntry>& entries, const Range& time) {
   const std::vector<std::string> labels{"roll [deg]", "pitch [deg]", "yaw [deg]"};
   std::vector<Plot> plots;
+  plots.reserve(labels.size());
   for (const int axis : {2, 0, 1})
     plots.push_back(error_panel(
         labels[static_cast<std::size_t>(axis)], truth, entries, time,
@@ -339,6 +341,7 @@ Range time_range(const Trajectory& truth, const std::vector<ReportEntry>& entrie
 
 std::string to_html(const std::string& title, const Trajectory& truth, const std::vector<ReportEntry>& entries) {
   std::vector<Evaluation> evaluations;
+  evaluations.reserve(entries.size());
   for (const ReportEntry& entry : entries) evaluations.push_back(entry.evaluation);
   const Range time = time_range(truth, entries);
 

@@ -188,6 +188,7 @@ std::vector<std::string> notes(const std::vector<Evaluation>& evaluations) {
 std::string to_table(const std::vector<Evaluation>& evaluations) {
   const std::vector<SummaryRow> rows = summary_rows(evaluations);
   std::vector<std::string> labels;
+  labels.reserve(rows.size());
   for (const SummaryRow& r : rows) labels.push_back(r.label);
   const auto label_width = static_cast<int>(largest_width(labels));
 
