@@ -35,7 +35,7 @@ class CommandLine(unittest.TestCase):
         self.assert_refused(ear(), "subcommand")
 
     def test_unknown_subcommand(self):
-        self.assert_refused(ear("dance"), "dance")
+        self.assert_refused(ear("dance"), "subcommand")
 
     def test_unknown_option(self):
         self.assert_refused(ear("run", "recording", "--dance"), "--dance")
@@ -44,8 +44,12 @@ class CommandLine(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             missing = Path(folder) / "missing"
             self.assert_refused(ear("run", missing, "--out", Path(folder) / "out"), str(missing))
-            self.assert_refused(ear("check", missing), str(missing))
             self.assert_refused(ear("evaluate", missing, missing), str(missing))
+
+    def test_check_reports_a_missing_recording(self):
+        result = ear("check", "missing")  # its findings are its output, not an error of the program
+        self.assertEqual(result.returncode, 2)
+        self.assertIn("missing: no such folder", result.stdout)
 
     def test_unknown_sequence(self):
         with tempfile.TemporaryDirectory() as folder:
