@@ -122,15 +122,15 @@ bool FeatureInformation::add_gated(const std::vector<LinearizedObservation>& obs
   for (const LinearizedObservation& z : observations) {
     const double w = weight(z);
     const int at = clone_column(z.clone);
-    const Eigen::Matrix<double, kCalibration, 2> wHcal = w * z.H_calibration.transpose();
-    const Eigen::Matrix<double, err::clone_size, 2> wHclone = w * z.H_clone.transpose();
-    feature_A_.topLeftCorner<kCalibration, kCalibration>().noalias() += wHcal * z.H_calibration;
-    feature_A_.block<err::clone_size, kCalibration>(at, 0).noalias() += wHclone * z.H_calibration;
-    feature_A_.block<err::clone_size, err::clone_size>(at, at).noalias() += wHclone * z.H_clone;
-    feature_b_.head<kCalibration>().noalias() += wHcal * z.residual;
-    feature_b_.segment<err::clone_size>(at).noalias() += wHclone * z.residual;
-    W.topRows<kCalibration>().noalias() += wHcal * z.H_f;
-    W.middleRows<err::clone_size>(at).noalias() += wHclone * z.H_f;
+    const Eigen::Matrix<double, kCalibration, 2> Hw_cal = w * z.H_calibration.transpose();
+    const Eigen::Matrix<double, err::clone_size, 2> Hw_clone = w * z.H_clone.transpose();
+    feature_A_.topLeftCorner<kCalibration, kCalibration>().noalias() += Hw_cal * z.H_calibration;
+    feature_A_.block<err::clone_size, kCalibration>(at, 0).noalias() += Hw_clone * z.H_calibration;
+    feature_A_.block<err::clone_size, err::clone_size>(at, at).noalias() += Hw_clone * z.H_clone;
+    feature_b_.head<kCalibration>().noalias() += Hw_cal * z.residual;
+    feature_b_.segment<err::clone_size>(at).noalias() += Hw_clone * z.residual;
+    W.topRows<kCalibration>().noalias() += Hw_cal * z.H_f;
+    W.middleRows<err::clone_size>(at).noalias() += Hw_clone * z.H_f;
   }
   V_llt.matrixU().solveInPlace<Eigen::OnTheRight>(W);
   feature_b_.head(size_).noalias() -= W * Lv;

@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <array>
 #include <cmath>
 
 namespace ear {
@@ -20,7 +21,7 @@ namespace ear {
 template <int m>
 [[nodiscard]] Eigen::Matrix3d gamma(const Eigen::Vector3d& phi) {
   static_assert(m >= 0 && m <= 2);
-  constexpr double kFactorial[] = {1.0, 1.0, 2.0, 6.0, 24.0, 120.0, 720.0};
+  constexpr std::array<double, 7> kFactorial = {1.0, 1.0, 2.0, 6.0, 24.0, 120.0, 720.0};
   const double x2 = phi.squaredNorm();
   const double x = std::sqrt(x2);
   double a = 0.0;  // factor of [phi]x

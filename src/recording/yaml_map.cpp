@@ -47,8 +47,8 @@ YamlMap YamlMap::load(const std::filesystem::path& file) {
   }
 }
 
-YamlMap::YamlMap(std::filesystem::path file, YAML::Node node, std::string prefix)
-    : file_(std::move(file)), node_(std::move(node)), prefix_(std::move(prefix)) {
+YamlMap::YamlMap(std::filesystem::path file, const YAML::Node& node, std::string prefix)
+    : file_(std::move(file)), node_(node), prefix_(std::move(prefix)) {
   if (node_.IsMap()) return;
   const std::string key = prefix_.empty() ? "" : prefix_.substr(0, prefix_.size() - 1);
   throw InputError(located(file_, line_of(node_), key, "keys and values expected"));

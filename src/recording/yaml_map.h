@@ -21,7 +21,7 @@ class YamlMap {
   [[nodiscard]] static YamlMap load(const std::filesystem::path& file);
 
   /// A map that was found inside `file`; `prefix` ("cam0.") goes before its keys in messages.
-  YamlMap(std::filesystem::path file, YAML::Node node, std::string prefix);
+  YamlMap(std::filesystem::path file, const YAML::Node& node, std::string prefix);
 
   [[nodiscard]] bool has(const std::string& key) const { return node_[key].IsDefined() && !node_[key].IsNull(); }
 
