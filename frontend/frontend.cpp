@@ -88,7 +88,7 @@ class Frontend::Impl {
   [[nodiscard]] Flow flow(std::size_t track) const;
   void reject();
   void match_stereo();
-  void match_stereo(Track& track, bool followed);
+  void match_stereo(Track& track, bool had_right);
   void detect();
   void refresh_patches();
   void drop(const std::vector<std::uint8_t>& keep);
@@ -276,16 +276,18 @@ void Frontend::Impl::reject() {
 
 void Frontend::Impl::match_stereo() {
   if (!right_present_) return;
-  for (Track& track : tracks_) match_stereo(track, track.has_depth);
+  for (std::size_t i = 0; i < tracks_.size(); ++i) match_stereo(tracks_[i], previous_[i].has_right);
 }
 
-void Frontend::Impl::match_stereo(Track& track, bool followed) {
+void Frontend::Impl::match_stereo(Track& track, bool had_right) {
   const ReferencePatch& patch = patches_[track.patch];
   std::optional<StereoMatch> match;
-  if (followed) {
+  if (track.has_depth) {
     match = stereo_->follow(right_, patch, track.left, track.left_ray, track.inverse_depth, track.right_from_left);
   }
-  if (!match) match = stereo_->search(right_, patch, track.left, track.left_ray);
+  // The search is expensive, and mostly fails where it has failed before: try again at ages 0, 1, 2, 4, 8, ...
+  const bool due = (track.age & (track.age - 1)) == 0;
+  if (!match && (had_right || due)) match = stereo_->search(right_, patch, track.left, track.left_ray);
   track.has_right = match.has_value();
   if (!match) return;
   track.has_depth = true;

@@ -46,7 +46,8 @@ class PatchLevel {
   [[nodiscard]] std::optional<Step> step_affine(const GreyLevel& level, const Eigen::Matrix2f& prior, float scale,
                                                 Warp& warp) const;
 
-  /// Zero-mean normalized correlation of the patch with the image; nothing if it leaves the image.
+  /// Zero-mean normalized correlation of every second row with the image, to compare places; nothing if the patch
+  /// leaves the image.
   [[nodiscard]] std::optional<float> correlate(const GreyLevel& level, const Warp& warp) const;
 
  private:

@@ -26,7 +26,7 @@ class ReferencePatch {
   /// not settle, or looks different there (correlation below kMinCorrelation).
   [[nodiscard]] std::optional<Match> align(const ImagePyramid& pyramid, const Warp& start, int start_level) const;
 
-  /// Correlation on one level at a fixed place; nothing if the level is unusable or the patch leaves it.
+  /// See PatchLevel::correlate, on one level at a fixed place; nothing if the level is unusable or the patch leaves it.
   [[nodiscard]] std::optional<float> correlate(const ImagePyramid& pyramid, const Warp& warp, int level) const;
 
   /// See PatchLevel::corner_strength, base level.
