@@ -48,7 +48,7 @@ std::filesystem::path FrameList::matching_right(TimeNs t_ns, Warnings& warnings)
                  located(left_.file(), 0, std::to_string(t_ns), "no image of cam1 at this time"));
     return {};
   }
-  const std::filesystem::path file = mav0_ / "cam1" / "data" / right_ahead_->filename;
+  std::filesystem::path file = mav0_ / "cam1" / "data" / right_ahead_->filename;
   right_ahead_.reset();
   return file;
 }

@@ -44,11 +44,9 @@ void ImuCheck::add(const ImuSample& sample) {
 // The largest value that an axis ever reaches is where it clips, if it stays there: runs of it are counted, and
 // forgotten when a larger value shows that it was not the end of the range.
 void ImuCheck::follow_extreme(Extreme& extreme, double value, double floor) {
-  if (value < floor) {
-    extreme.run = 0;
-  } else if (value > extreme.value) {
+  if (value >= floor && value > extreme.value) {
     extreme = {value, 1, 0};
-  } else if (value == extreme.value) {
+  } else if (value >= floor && value == extreme.value) {
     ++extreme.run;
     if (extreme.run == kClippedRun) extreme.clipped += kClippedRun;
     if (extreme.run > kClippedRun) ++extreme.clipped;

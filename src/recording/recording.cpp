@@ -207,7 +207,7 @@ TimeNs time_of(const Sample& sample) {
 
 fs::path find_mav0(const fs::path& folder) {
   if (!fs::is_directory(folder)) throw InputError(located(folder, 0, "", "no such folder"));
-  const fs::path mav0 = fs::is_directory(folder / "mav0") ? folder / "mav0" : folder;
+  fs::path mav0 = fs::is_directory(folder / "mav0") ? folder / "mav0" : folder;
   if (!fs::is_directory(mav0 / "imu0")) {
     throw InputError(located(mav0 / "imu0", 0, "", "no such folder: a recording needs an IMU"));
   }
