@@ -45,8 +45,8 @@ bool inside(const GreyLevel& level, const Warp& warp, float half) {
 
 // Bilinear samples of an n x n patch under a warp; the caller has checked that it is inside. Fetching is kept apart from
 // arithmetic, which compilers then turn into vector code.
-// Takes every `row_step`-th row.
-template <int n, int row_step = 1>
+// Leaves out `skip` rows above and below.
+template <int n, int skip = 0>
 void sample(const GreyLevel& level, const Warp& warp, float* out) {
   constexpr float kReach = 0.5F * (n - 1);
   constexpr float kScale = 1.0F / static_cast<float>(kFixedOne);
@@ -61,7 +61,7 @@ void sample(const GreyLevel& level, const Warp& warp, float* out) {
     along_y[static_cast<std::size_t>(i)] = i * step_y;
   }
   std::array<int, n> x, y, above, below;  // the last two: pairs of neighbouring pixels
-  for (int row = 0; row < n; row += row_step, out += n) {
+  for (int row = skip; row < n - skip; ++row, out += n) {
     const Eigen::Vector2f first = start + static_cast<float>(row) * warp.affine.col(1);
     const int first_x = to_fixed(first.x() + static_cast<float>(kOffset));
     const int first_y = to_fixed(first.y() + static_cast<float>(kOffset));
@@ -341,21 +341,20 @@ std::optional<PatchLevel::Step> PatchLevel::step_affine(const GreyLevel& level, 
 }
 
 std::optional<float> PatchLevel::correlate(const GreyLevel& level, const Warp& warp) const {
-  constexpr std::size_t kRowStep = 2;
-  constexpr float kInverseCount = static_cast<float>(kRowStep) / static_cast<float>(kPixels);
+  constexpr std::size_t kSkip = 4;
+  constexpr std::size_t kRows = kSize - 2 * kSkip;
+  constexpr float kInverseCount = 1.0F / static_cast<float>(kRows * kSize);
   if (!inside(level, warp, kHalf)) return std::nullopt;
-  alignas(16) std::array<float, kPixels / kRowStep> image;
-  sample<kSize, kRowStep>(level, warp, image.data());
+  alignas(16) std::array<float, kRows * kSize> image;
+  sample<kSize, kSkip>(level, warp, image.data());
   PhotometricSums sums;
   Quad value = Quad::Zero();
   Quad value2 = Quad::Zero();
-  for (std::size_t row = 0; row < kSize; row += kRowStep) {
-    for (std::size_t column = 0; column < kSize; column += kQuad) {
-      const Quad value_quad = load(&value_[row * kSize + column]);
-      sums.add(load(&image[row / kRowStep * kSize + column]) - mean_, value_quad);
-      value += value_quad;
-      value2 += value_quad * value_quad;
-    }
+  for (std::size_t at = 0; at < image.size(); at += kQuad) {
+    const Quad value_quad = load(&value_[kSkip * kSize + at]);
+    sums.add(load(&image[at]) - mean_, value_quad);
+    value += value_quad;
+    value2 += value_quad * value_quad;
   }
   const float image_sum = sums.image.sum();
   const float value_sum = value.sum();

@@ -10,12 +10,13 @@ namespace ear {
 namespace {
 
 constexpr int kSearchLevel = 2;
+constexpr int kRefineLevel = 1;
 constexpr double kSearchStep_px = 4.0;       // on the base image: one pixel of the search level
 constexpr double kMaxDisparityShare = 0.2;   // of the image's width
 constexpr float kMinSearchCorrelation = 0.5F;  // on the search level
 constexpr float kRivalMargin = 0.1F;           // a second peak this close to the first is looked at as well
 constexpr float kAmbiguous = 0.03F;            // two places that differ less are not told apart
-constexpr double kMaxEpipolar_px = 1.0;
+constexpr double kMaxEpipolar_px = 2.5;        // calibrations are off by more than patches are
 constexpr double kMinDisparity_px = -0.7;      // noise of a point at infinity
 constexpr double kMaxDepthJump_px = 1.5;       // disparity against what was carried over, plus
 constexpr double kMaxDepthJumpShare = 0.1;     // this share of the disparity
@@ -108,7 +109,7 @@ std::optional<StereoMatch> StereoMatcher::search(const ImagePyramid& right, cons
 
   std::optional<ReferencePatch::Match> best;
   for (const Hypothesis& peak : peaks) {
-    const auto match = patch.align(right, {peak.pixel.cast<float>(), affine}, level);
+    const auto match = patch.align(right, {peak.pixel.cast<float>(), affine}, kRefineLevel);
     if (!match) continue;
     if (!best) {
       best = match;
