@@ -86,7 +86,7 @@ Scene make_room(const Terrain& terrain) {
   // Walls look inwards: u x v is the normal.
   const Panel south{{kLength, 0.0, -kBelow}, -x, z, kLength, tall, Material::wall};
   const Panel north{{0.0, kWidth, -kBelow}, x, z, kLength, tall, Material::wall};
-  const Panel west{{0.0, 0.0, -kBelow}, y, z, kWidth, tall, Material::wall};
+  const Panel west{{0.0, 0.0, -kBelow}, y, z, kWidth, tall, Material::brick};
   const Panel east{{kLength, kWidth, -kBelow}, -y, z, kWidth, tall, Material::wall};
   const Panel ceiling{{0.0, kWidth, kHeight}, x, -y, kLength, kWidth, Material::ceiling};
   room.panels = {south, north, west, east, ceiling};

@@ -11,7 +11,7 @@
 namespace ear::simulator {
 
 /// What a panel looks like (texture.h).
-enum class Material { floor, wall, ceiling, wood, cardboard, poster, shelf, concrete, metal };
+enum class Material { floor, wall, brick, ceiling, wood, cardboard, poster, shelf, concrete, metal };
 
 /// A one-sided rectangle: corner + a u + b v with 0 <= a <= width, 0 <= b <= height; seen from where its normal points.
 struct Panel {

@@ -2,15 +2,20 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace ear::simulator {
 namespace {
 
-constexpr double kMarchStep = 0.02;  // [m] far below the wavelengths of any ground here
 constexpr double kFarthest = 100.0;  // [m] a ray along a wavy ground is given up here
-constexpr int kBisections = 40;
+constexpr double kClose = 1e-9;      // [m]
+constexpr int kMostSteps = 400;
 
 }  // namespace
+
+Terrain::Terrain(std::vector<GroundWave> waves) : waves_(std::move(waves)) {
+  for (const GroundWave& wave : waves_) sharpest_ += std::abs(wave.amplitude) * wave.wave_vector.squaredNorm();
+}
 
 double Terrain::height(double x, double y) const {
   double sum = 0.0;
@@ -49,34 +54,27 @@ std::optional<double> Terrain::cast(const Eigen::Vector3d& origin_W, const Eigen
     return range >= 0.0 && range <= max_range ? std::optional(range) : std::nullopt;
   }
 
-  const auto above = [&](double range) {
-    const Eigen::Vector3d p_W = origin_W + range * direction_W;
-    return p_W.z() - height(p_W.x(), p_W.y());
-  };
-  // The ground lies between two planes: march only between them.
+  // The ground lies below this height: start there.
   const double top = bound();
-  double near = 0.0;
-  double far = std::min(max_range, kFarthest);
+  double range = 0.0;
   if (origin_W.z() > top) {
     if (descent <= 0.0) return std::nullopt;
-    near = (origin_W.z() - top) / descent;
+    range = (origin_W.z() - top) / descent;
   }
-  if (descent > 0.0) {
-    far = std::min(far, (origin_W.z() + top) / descent + kMarchStep);
-  } else if (descent < 0.0) {
-    far = std::min(far, (top - origin_W.z()) / -descent);
-  }
-  if (above(near) < 0.0) return std::nullopt;
-  while (near < far) {
-    double next = std::min(near + kMarchStep, far);
-    if (above(next) < 0.0) {
-      for (int i = 0; i < kBisections; ++i) {
-        const double middle = 0.5 * (near + next);
-        (above(middle) < 0.0 ? next : near) = middle;
-      }
-      return near;
-    }
-    near = next;
+  // gap(s) >= gap + gap' s - curving s^2 / 2 along the ray: a step to where this bound vanishes never passes the first
+  // meeting, and is Newton's close to it.
+  const Eigen::Vector2d along = direction_W.head<2>();
+  const double curving = std::max(1e-9, sharpest_ * along.squaredNorm());
+  const double farthest = std::min(max_range, kFarthest);
+  for (int i = 0; i < kMostSteps && range <= farthest; ++i) {
+    const Eigen::Vector3d p_W = origin_W + range * direction_W;
+    if (descent <= 0.0 && p_W.z() > top) return std::nullopt;
+    const double gap = p_W.z() - height(p_W.x(), p_W.y());
+    if (gap < -kClose) return std::nullopt;  // starts below the ground
+    if (gap < kClose) return range;
+    const double slope = direction_W.z() - gradient(p_W.x(), p_W.y()).dot(along);
+    const double root = std::sqrt(slope * slope + 2.0 * curving * gap);
+    range += slope < 0.0 ? 2.0 * gap / (root - slope) : (slope + root) / curving;
   }
   return std::nullopt;
 }

@@ -19,7 +19,7 @@ struct GroundWave {
 class Terrain {
  public:
   Terrain() = default;
-  explicit Terrain(std::vector<GroundWave> waves) : waves_(std::move(waves)) {}
+  explicit Terrain(std::vector<GroundWave> waves);
 
   [[nodiscard]] bool flat() const { return waves_.empty(); }
   /// h(x, y) [m].
@@ -36,6 +36,7 @@ class Terrain {
 
  private:
   std::vector<GroundWave> waves_;
+  double sharpest_ = 0.0;  // no curvature of the ground exceeds it [1/m]
 };
 
 }  // namespace ear::simulator

@@ -1,0 +1,77 @@
+// ear simulate SEQUENCE --out DIR: a recording of a vehicle that does not exist, with its truth.
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <thread>
+
+#include "tools/commands.h"
+#include "tools/progress.h"
+#include "tools/simulator/recording_writer.h"
+#include "tools/simulator/sequence.h"
+#include "tools/simulator/simulation.h"
+
+namespace ear::tools {
+namespace {
+
+struct SimulateArguments {
+  simulator::Options options;
+  std::filesystem::path out;
+  bool no_images = false;
+  std::filesystem::path images_from;
+  int threads = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+};
+
+void simulate(const SimulateArguments& args) {
+  simulator::Options options = args.options;
+  options.tracks = false;
+  const simulator::Simulation simulation(options);
+  simulator::write_recording(simulation, args.out);
+
+  if (!args.images_from.empty()) {
+    simulator::link_images(simulation, args.out, args.images_from);
+  } else if (!args.no_images) {
+    Progress progress;
+    simulator::render_images(simulation, args.out, args.threads, [&](std::size_t done, std::size_t total) {
+      progress.show("rendering " + std::to_string(done) + " of " + std::to_string(total) + " images");
+    });
+    progress.finish();
+  }
+  std::printf("%s: %s seed %llu, %.1f s, %.1f m, %zu stereo frames%s\n", args.out.c_str(), options.sequence.c_str(),
+              static_cast<unsigned long long>(options.seed),
+              seconds_between(simulation.imu().front().t_ns, simulation.imu().back().t_ns), simulation.path_length(),
+              simulation.frame_times().size(), args.no_images ? " (without images)" : "");
+}
+
+std::string list_of_sequences() {
+  std::string list = "Sequences:";
+  for (const std::string& name : simulator::sequence_names()) {
+    list += "\n  " + name + ": " + simulator::find_sequence(name).summary;
+  }
+  return list;
+}
+
+}  // namespace
+
+void add_simulate_command(CLI::App& app) {
+  const auto args = std::make_shared<SimulateArguments>();
+  CLI::App* command = app.add_subcommand("simulate", "write a recording of a simulated vehicle, with its truth");
+  command->footer(list_of_sequences());
+  command->add_option("sequence", args->options.sequence, "what it does (below)")->required();
+  command->add_option("--out", args->out, "folder of the recording; must not hold one yet")->required();
+  command->add_option("--seed", args->options.seed, "varies noise, textures and details of the motion");
+  command->add_option("--duration", args->options.duration, "[s] stop earlier, or keep standing at the end");
+  command->add_option("--camera-rate", args->options.camera_rate_hz, "[Hz]")->capture_default_str();
+  command->add_flag("--perfect-calibration", args->options.perfect_calibration,
+                    "write the true calibration instead of a slightly wrong one; all else stays the same");
+  CLI::Option* no_images = command->add_flag("--no-images", args->no_images, "everything but the pictures");
+  command->add_option("--images-from", args->images_from, "link the pictures of this recording of the same simulation")
+      ->excludes(no_images);
+  command->add_option("--threads", args->threads, "that render; the pictures do not depend on it")
+      ->check(CLI::PositiveNumber);
+  command->callback([args] { simulate(*args); });
+}
+
+}  // namespace ear::tools

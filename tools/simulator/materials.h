@@ -1,0 +1,20 @@
+// What the room's surfaces look like: procedural pictures with detail at every scale, and some surfaces almost without.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "tools/simulator/scene.h"
+#include "tools/simulator/texture.h"
+
+namespace ear::simulator {
+
+struct Appearance {
+  std::vector<Texture> panels;  ///< one per panel of the scene
+  Texture ground;
+};
+
+/// The same seed gives the same room.
+[[nodiscard]] Appearance paint_room(const Scene& scene, std::uint64_t seed);
+
+}  // namespace ear::simulator
