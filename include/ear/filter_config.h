@@ -19,12 +19,12 @@ struct StandstillConfig {
 /// Standard deviations at the start, before anything was measured.
 struct PriorConfig {
   double gyro_bias = 0.1;         ///< [rad/s]
-  double accel_bias = 0.1;        ///< [m/s^2]
-  double camera_rotation = 5e-3;  ///< [rad] camera 0 in the body, where it is estimated
-  double camera_position = 5e-3;  ///< [m]
-  double stereo_rotation = 5e-4;  ///< [rad] camera 1 in camera 0
-  double stereo_position = 2e-4;  ///< [m]
-  double time_offset = 2e-3;      ///< [s] camera against IMU
+  double accel_bias = 0.05;       ///< [m/s^2]
+  double camera_rotation = 2e-3;  ///< [rad] camera 0 in the body, where it is estimated
+  double camera_position = 1e-3;  ///< [m]
+  double stereo_rotation = 2e-4;  ///< [rad] camera 1 in camera 0
+  double stereo_position = 1e-4;  ///< [m]
+  double time_offset = 1e-3;      ///< [s] camera against IMU
 };
 
 /// What is calibrated while running. A frozen quantity keeps its value, and its uncertainty is not accounted for.

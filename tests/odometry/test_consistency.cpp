@@ -1,0 +1,123 @@
+// Is the error what the covariance says? Monte-Carlo on simulated feature tracks, against chi-squared bands.
+#include <doctest/doctest.h>
+
+#include <Eigen/Cholesky>
+#include <atomic>
+#include <thread>
+#include <vector>
+
+#include "filter/chi_squared.h"
+#include "filter/filter.h"
+#include "tools/simulator/simulation.h"
+
+using namespace ear;
+
+namespace {
+
+constexpr int kRuns = 50;
+constexpr double kDuration = 60.0;  // [s]
+constexpr double kMoving =
+    5.0;  // [s] from here on: the vehicle has left its start, where the pose is known by definition
+constexpr std::uint64_t kFirstSeed = 7001;  // not used in development
+
+struct Nees {
+  std::vector<double> position, orientation;  // per frame
+};
+
+/// The truth seen from the estimator's world, whose origin and yaw are the first pose.
+struct WorldAlignment {
+  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d p = Eigen::Vector3d::Zero();
+
+  WorldAlignment(const NavState& first, const simulator::Truth& truth) {
+    const Eigen::Matrix3d D = first.q_WB.toRotationMatrix() * truth.R_WB.transpose();
+    R = Eigen::AngleAxisd(std::atan2(D(1, 0) - D(0, 1), D(0, 0) + D(1, 1)), Eigen::Vector3d::UnitZ())
+            .toRotationMatrix();
+    p = first.p_WB - R * truth.p_WB;
+  }
+};
+
+Nees run(const char* sequence, std::uint64_t seed, bool calibrate) {
+  simulator::Options options;
+  options.sequence = sequence;
+  options.seed = seed;
+  options.perfect_calibration = !calibrate;
+  options.duration = kDuration;
+  const simulator::Simulation simulation(options);
+  FilterConfig config;
+  config.feature_sigma_px = options.track.sigma_px;
+  config.online_calibration.camera_extrinsics = calibrate;
+  config.online_calibration.time_offset = calibrate;
+  Filter filter(config, simulation.calibration());
+
+  Nees nees;
+  std::optional<WorldAlignment> world;
+  std::size_t next_imu = 0;
+  const TimeNs start = simulation.frame_times().front();
+  for (std::size_t i = 0; i < simulation.frame_times().size(); ++i) {
+    const TimeNs t_ns = simulation.frame_times()[i];
+    while (next_imu < simulation.imu().size() && simulation.imu()[next_imu].t_ns < t_ns + 10'000'000) {
+      filter.add_imu(simulation.imu()[next_imu++]);
+    }
+    const std::optional<Estimate> estimate = filter.process(simulation.tracks(i));
+    if (!estimate) continue;
+    const simulator::Truth truth = simulation.truth(estimate->state.t_ns);
+    if (!world) world.emplace(estimate->state, truth);
+    if (seconds_between(start, t_ns) < kMoving) continue;
+    const Eigen::Vector3d dp = world->R * truth.p_WB + world->p - estimate->state.p_WB;
+    const Eigen::Vector3d dtheta = log_so3(world->R * truth.R_WB * estimate->state.q_WB.toRotationMatrix().transpose());
+    const Eigen::Matrix3d P_p = estimate->covariance.block<3, 3>(estimate_error::position, estimate_error::position);
+    const Eigen::Matrix3d P_R = estimate->covariance.block<3, 3>(estimate_error::rotation, estimate_error::rotation);
+    nees.position.push_back(dp.dot(P_p.ldlt().solve(dp)));
+    nees.orientation.push_back(dtheta.dot(P_R.ldlt().solve(dtheta)));
+  }
+  return nees;
+}
+
+std::vector<Nees> run_all(const char* sequence, bool calibrate) {
+  std::vector<Nees> all(kRuns);
+  std::atomic<int> next{0};
+  std::vector<std::thread> threads;
+  for (unsigned i = 0; i < std::max(1U, std::thread::hardware_concurrency()); ++i) {
+    threads.emplace_back([&] {
+      for (int run_index = next++; run_index < kRuns; run_index = next++) {
+        all[static_cast<std::size_t>(run_index)] =
+            run(sequence, kFirstSeed + static_cast<std::uint64_t>(run_index), calibrate);
+      }
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  return all;
+}
+
+/// Share of the time in which the mean over the runs lies in the band that 95 % of chi-squared means of 3 dof lie in.
+double share_in_band(const std::vector<Nees>& runs, const std::vector<double> Nees::*which) {
+  const double low = ChiSquaredGate(0.025, 3 * kRuns)(3 * kRuns) / kRuns;
+  const double high = ChiSquaredGate(0.975, 3 * kRuns)(3 * kRuns) / kRuns;
+  std::size_t frames = (runs.front().*which).size();
+  for (const Nees& nees : runs) frames = std::min(frames, (nees.*which).size());
+  REQUIRE(frames > 1000);
+  std::size_t inside = 0;
+  double total = 0.0;
+  for (std::size_t i = 0; i < frames; ++i) {
+    double mean = 0.0;
+    for (const Nees& nees : runs) mean += (nees.*which)[i] / kRuns;
+    inside += mean >= low && mean <= high ? 1 : 0;
+    total += mean / static_cast<double>(frames);
+  }
+  MESSAGE("mean NEES " << total << " of 3, band " << low << " to " << high);
+  return static_cast<double>(inside) / static_cast<double>(frames);
+}
+
+void check_consistency(const char* sequence, bool calibrate) {
+  const std::vector<Nees> runs = run_all(sequence, calibrate);
+  CHECK(share_in_band(runs, &Nees::position) >= 0.95);
+  CHECK(share_in_band(runs, &Nees::orientation) >= 0.95);
+}
+
+}  // namespace
+
+TEST_CASE("consistency: flat1, calibration known") { check_consistency("flat1", false); }
+TEST_CASE("consistency: flat1, calibration estimated") { check_consistency("flat1", true); }
+TEST_CASE("consistency: fly1, calibration known") { check_consistency("fly1", false); }
+TEST_CASE("consistency: fly1, calibration estimated") { check_consistency("fly1", true); }
