@@ -1,19 +1,18 @@
 #include "frontend/detector.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <opencv2/features2d.hpp>
-
-#include "frontend/patch.h"
 
 namespace ear {
 namespace {
 
-constexpr int kMargin = 10;                // [px] from the image's edge: the patch and a bit
-constexpr int kFastReach = 3;              // [px] radius of FAST's circle: cells are searched with this overlap
+constexpr int kMargin = 10;                       // [px] from the image's edge: the patch and a bit
+constexpr int kFastReach = 3;                     // [px] radius of FAST's circle: cells are searched with this overlap
 constexpr std::array<int, 2> kThresholds{20, 7};  // grey steps of FAST, tried in this order
-constexpr std::size_t kCandidates = 5;     // of one cell, ranked by FAST's score, that are looked at closely
-constexpr float kMinStrength = 1000.0F;     // [grey^2] 3 grey values of noise then move a patch by 0.15 px
+constexpr std::size_t kCandidates = 5;            // of one cell, ranked by FAST's score, that are looked at closely
+constexpr float kMinStrength = 1000.0F;           // [grey^2] 3 grey values of noise then move a patch by 0.15 px
 constexpr int kMaxPerCell = 3;
 
 bool far_from_all(const Eigen::Vector2f& pixel, const std::vector<Eigen::Vector2f>& others, float distance) {
@@ -40,6 +39,12 @@ float corner_strength(const GreyLevel& image, int u, int v) {
   const float b = 0.125F * static_cast<float>(xx - yy);
   const float c = 0.25F * static_cast<float>(xy);
   return a - std::sqrt(b * b + c * c);
+}
+
+// FAST's order, made independent of the order in which corners are found.
+bool stronger(const cv::KeyPoint& a, const cv::KeyPoint& b) {
+  if (a.response != b.response) return a.response > b.response;
+  return a.pt.y != b.pt.y ? a.pt.y < b.pt.y : a.pt.x < b.pt.x;
 }
 
 // Half a pixel right and down of a pixel lies the middle of an even patch that needs no interpolation.
@@ -72,53 +77,60 @@ double Detector::coverage(const std::vector<Eigen::Vector2f>& pixels) const {
   return static_cast<double>(held) / static_cast<double>(count.size());
 }
 
+// Where corners of a cell may lie: the cell, less the image's margin.
+cv::Rect Detector::area_of(std::size_t cell) const {
+  const int column = static_cast<int>(cell) % columns_;
+  const int row = static_cast<int>(cell) / columns_;
+  const auto edge = [&](int index) { return static_cast<int>(static_cast<float>(index) * cell_); };
+  const cv::Rect area(cv::Point(edge(column), edge(row)), cv::Point(edge(column + 1), edge(row + 1)));
+  return area & cv::Rect(kMargin, kMargin, width_ - 2 * kMargin, height_ - 2 * kMargin);
+}
+
+std::optional<Corner> Detector::best_in_cell(const ImagePyramid& pyramid, std::size_t cell,
+                                             const std::vector<Eigen::Vector2f>& occupied) const {
+  const cv::Rect area = area_of(cell);
+  if (area.empty()) return std::nullopt;
+  const cv::Rect searched(area.x - kFastReach, area.y - kFastReach, area.width + 2 * kFastReach,
+                          area.height + 2 * kFastReach);
+  const cv::Mat image = pyramid.image()(searched);
+  std::vector<cv::KeyPoint> found;
+  for (const int threshold : kThresholds) {
+    cv::FAST(image, found, threshold, true);
+    for (cv::KeyPoint& keypoint : found) keypoint.pt += cv::Point2f(searched.tl());
+    const auto too_close = [&](const cv::KeyPoint& keypoint) {
+      return !far_from_all(patch_centre(keypoint.pt), occupied, min_distance_);
+    };
+    found.erase(std::remove_if(found.begin(), found.end(), too_close), found.end());
+    const std::size_t candidates = std::min(found.size(), kCandidates);
+    std::partial_sort(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(candidates), found.end(), stronger);
+
+    Corner best;
+    for (std::size_t i = 0; i < candidates; ++i) {
+      const cv::Point2f& pt = found[i].pt;
+      const float strength = corner_strength(pyramid.level(0), static_cast<int>(pt.x), static_cast<int>(pt.y));
+      if (strength > best.strength) best = {patch_centre(pt), strength};
+    }
+    if (best.strength >= kMinStrength) return best;
+  }
+  return std::nullopt;
+}
+
 std::vector<Corner> Detector::detect(const ImagePyramid& pyramid, const std::vector<Eigen::Vector2f>& taken,
                                      int wanted) {
   std::vector<Corner> corners;
-  if (wanted <= 0) return corners;
   std::vector<Eigen::Vector2f> occupied = taken;
   std::vector<int> count = count_per_cell(taken);
   const std::size_t cells = count.size();
-  const GreyLevel& image = pyramid.level(0);
-  std::vector<cv::KeyPoint> keypoints;
-  for (int round = 0; round < kMaxPerCell && static_cast<int>(corners.size()) < wanted; ++round) {
-    for (std::size_t k = 0; k < cells && static_cast<int>(corners.size()) < wanted; ++k) {
+  const auto enough = [&] { return static_cast<int>(corners.size()) >= wanted; };
+  for (int round = 0; round < kMaxPerCell && !enough(); ++round) {
+    for (std::size_t k = 0; k < cells && !enough(); ++k) {
       const std::size_t cell = (next_ + k) % cells;
       if (count[cell] != round) continue;
-      const int column = static_cast<int>(cell) % columns_;
-      const int row = static_cast<int>(cell) / columns_;
-      const int left = std::max(static_cast<int>(static_cast<float>(column) * cell_), kMargin) - kFastReach;
-      const int top = std::max(static_cast<int>(static_cast<float>(row) * cell_), kMargin) - kFastReach;
-      const int right = std::min(static_cast<int>(static_cast<float>(column + 1) * cell_), width_ - kMargin) + kFastReach;
-      const int bottom = std::min(static_cast<int>(static_cast<float>(row + 1) * cell_), height_ - kMargin) + kFastReach;
-      if (right - left <= 2 * kFastReach || bottom - top <= 2 * kFastReach) continue;
-      const cv::Mat roi = pyramid.image()(cv::Range(top, bottom), cv::Range(left, right));
-      for (const int threshold : kThresholds) {
-        cv::FAST(roi, keypoints, threshold, true);
-        const cv::Point2f offset(static_cast<float>(left), static_cast<float>(top));
-        for (cv::KeyPoint& keypoint : keypoints) keypoint.pt += offset;
-        keypoints.erase(std::remove_if(keypoints.begin(), keypoints.end(), [&](const cv::KeyPoint& keypoint) {
-                          return !far_from_all(patch_centre(keypoint.pt), occupied, min_distance_);
-                        }), keypoints.end());
-        const auto stronger = [](const cv::KeyPoint& a, const cv::KeyPoint& b) {
-          if (a.response != b.response) return a.response > b.response;
-          return a.pt.y != b.pt.y ? a.pt.y < b.pt.y : a.pt.x < b.pt.x;
-        };
-        const std::size_t looked_at = std::min(keypoints.size(), kCandidates);
-        std::partial_sort(keypoints.begin(), keypoints.begin() + static_cast<std::ptrdiff_t>(looked_at),
-                          keypoints.end(), stronger);
-        Corner best;
-        for (std::size_t i = 0; i < looked_at; ++i) {
-          const cv::Point2f& pt = keypoints[i].pt;
-          const float strength = corner_strength(image, static_cast<int>(pt.x), static_cast<int>(pt.y));
-          if (strength > best.strength) best = {patch_centre(pt), strength};
-        }
-        if (best.strength < kMinStrength) continue;
-        corners.push_back(best);
-        occupied.push_back(best.pixel);
-        ++count[cell];
-        break;
-      }
+      const std::optional<Corner> corner = best_in_cell(pyramid, cell, occupied);
+      if (!corner) continue;
+      corners.push_back(*corner);
+      occupied.push_back(corner->pixel);
+      ++count[cell];
     }
   }
   next_ = (next_ + cells / 3 + 1) % cells;

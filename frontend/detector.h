@@ -1,7 +1,10 @@
-// New features where there are none: FAST corners in the emptiest cells of a grid, ranked by how well they can be tracked.
+// New features where there are none: FAST corners in the emptiest cells of a grid, ranked by how well they can be
+// tracked.
 #pragma once
 
 #include <Eigen/Core>
+#include <opencv2/core/types.hpp>
+#include <optional>
 #include <vector>
 
 #include "frontend/image_pyramid.h"
@@ -28,14 +31,17 @@ class Detector {
 
  private:
   [[nodiscard]] std::vector<int> count_per_cell(const std::vector<Eigen::Vector2f>& pixels) const;
+  [[nodiscard]] cv::Rect area_of(std::size_t cell) const;
+  [[nodiscard]] std::optional<Corner> best_in_cell(const ImagePyramid& pyramid, std::size_t cell,
+                                                   const std::vector<Eigen::Vector2f>& occupied) const;
 
   int width_;
   int height_;
   int columns_;
   int rows_;
-  float cell_;              // [px]
-  float min_distance_;      // [px]
-  std::size_t next_ = 0;    // cell to begin with: a different one each time
+  float cell_;            // [px]
+  float min_distance_;    // [px]
+  std::size_t next_ = 0;  // cell to begin with: a different one each time
 };
 
 }  // namespace ear

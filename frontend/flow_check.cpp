@@ -12,8 +12,8 @@
 namespace ear {
 namespace {
 
-constexpr std::size_t kMinFlows = 8;        // fewer say nothing about a common motion
-constexpr std::size_t kMinDepths = 8;       // to measure the translation with its length
+constexpr std::size_t kMinFlows = 8;   // fewer say nothing about a common motion
+constexpr std::size_t kMinDepths = 8;  // to measure the translation with its length
 constexpr int kMaxTrials = 60;
 constexpr double kConfidence = 0.999;
 constexpr double kGoodGuess = 0.8;          // share of inliers at which a known motion needs no search
@@ -208,26 +208,35 @@ Consensus FlowCheck::find(const std::vector<Flow>& flows, const MotionGuess& gue
     problem.depth_sigma_unknown = 1e3;  // the translation has unit length: depths have no unit
     std::vector<std::size_t> all(flows.size());
     std::iota(all.begin(), all.end(), std::size_t{0});
-    search<2>(problem, all, random_, [&](const std::array<std::size_t, 2>& s) -> std::optional<Transfer> {
-      const auto p = solve_direction(flows, s[0], s[1], guess.motion.R_10);
-      if (!p) return std::nullopt;
-      return Transfer{guess.motion.R_10, *p};
-    }, best);
+    search<2>(
+        problem, all, random_,
+        [&](const std::array<std::size_t, 2>& s) -> std::optional<Transfer> {
+          const auto p = solve_direction(flows, s[0], s[1], guess.motion.R_10);
+          if (!p) return std::nullopt;
+          return Transfer{guess.motion.R_10, *p};
+        },
+        best);
     return {best.flags, guess.motion, false};
   }
 
   if (search_needed && guess.rotation_known) {
-    search<2>(problem, with_depth, random_, [&](const std::array<std::size_t, 2>& s) -> std::optional<Transfer> {
-      const auto p = solve_translation(flows, s[0], s[1], guess.motion.R_10);
-      if (!p) return std::nullopt;
-      return Transfer{guess.motion.R_10, *p};
-    }, best);
+    search<2>(
+        problem, with_depth, random_,
+        [&](const std::array<std::size_t, 2>& s) -> std::optional<Transfer> {
+          const auto p = solve_translation(flows, s[0], s[1], guess.motion.R_10);
+          if (!p) return std::nullopt;
+          return Transfer{guess.motion.R_10, *p};
+        },
+        best);
   } else if (search_needed) {
-    search<3>(problem, with_depth, random_, [&](const std::array<std::size_t, 3>& s) -> std::optional<Transfer> {
-      Flags used(flows.size(), 0);
-      for (const std::size_t i : s) used[i] = 1;
-      return refine(flows, used, guess.motion, 5);
-    }, best);
+    search<3>(
+        problem, with_depth, random_,
+        [&](const std::array<std::size_t, 3>& s) -> std::optional<Transfer> {
+          Flags used(flows.size(), 0);
+          for (const std::size_t i : s) used[i] = 1;
+          return refine(flows, used, guess.motion, 5);
+        },
+        best);
   }
   // Gyroscope and prediction are not perfect: let the inliers correct them, then decide.
   const std::optional<Transfer> refined = refine(flows, best.flags, best.motion, kRefinements);

@@ -16,8 +16,8 @@ namespace ear {
 struct Flow {
   Eigen::Vector2d x0 = Eigen::Vector2d::Zero();
   Eigen::Vector2d x1 = Eigen::Vector2d::Zero();
-  double inverse_depth0 = 0.0;        ///< [1/m], used if has_depth
-  double inverse_depth_sigma = 0.0;   ///< [1/m]
+  double inverse_depth0 = 0.0;       ///< [1/m], used if has_depth
+  double inverse_depth_sigma = 0.0;  ///< [1/m]
   bool has_depth = false;
 };
 

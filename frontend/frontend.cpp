@@ -19,27 +19,27 @@
 namespace ear {
 namespace {
 
-constexpr float kEdge_px = 8.0F;                // features closer to the image's edge are dropped
-constexpr float kMinTrackDistance_px = 5.0F;    // two tracks closer than this have become one
+constexpr float kEdge_px = 8.0F;              // features closer to the image's edge are dropped
+constexpr float kMinTrackDistance_px = 5.0F;  // two tracks closer than this have become one
 constexpr double kFlowTolerance_px = 1.0;
-constexpr double kDisparitySigma_px = 1.0;      // for the depth's part of that tolerance
-constexpr double kMapStep_px = 4.0;             // of the finite differences of a predicted affine map
-constexpr int kLevelMeasured = 0;               // where to begin: with depth and a motion measured in this frame,
-constexpr int kLevelPredicted = 2;              // with a predicted rotation,
+constexpr double kDisparitySigma_px = 1.0;  // for the depth's part of that tolerance
+constexpr double kMapStep_px = 4.0;         // of the finite differences of a predicted affine map
+constexpr int kLevelMeasured = 0;           // where to begin: with depth and a motion measured in this frame,
+constexpr int kLevelPredicted = 2;          // with a predicted rotation,
 constexpr int kLevelUnknown = ImagePyramid::kMaxLevels - 1;  // and without
-constexpr std::size_t kProbes = 24;             // features that measure the motion for the others
-constexpr float kRefreshStretch = 1.3F;         // a feature that has grown or shrunk this much gets a new patch
+constexpr std::size_t kProbes = 24;                          // features that measure the motion for the others
+constexpr float kRefreshStretch = 1.3F;  // a feature that has grown or shrunk this much gets a new patch
 
 struct Track {
   std::uint64_t id = 0;
-  int age = 0;                 // frames since detection
-  std::size_t patch = 0;       // index into the store
-  Warp left;                   // of the reference patch
+  int age = 0;            // frames since detection
+  std::size_t patch = 0;  // index into the store
+  Warp left;              // of the reference patch
   Eigen::Vector2d left_ray = Eigen::Vector2d::Zero();
   bool has_depth = false;      // known from this or an earlier frame
   double inverse_depth = 0.0;  // 1/z in the left camera of this frame
   Eigen::Matrix2f right_from_left = Eigen::Matrix2f::Identity();
-  bool has_right = false;      // seen by the right camera in this frame
+  bool has_right = false;  // seen by the right camera in this frame
   Eigen::Vector2d right_ray = Eigen::Vector2d::Zero();
 };
 
@@ -106,7 +106,7 @@ class Frontend::Impl {
   ImagePyramid left_;
   ImagePyramid right_;
   bool right_present_ = false;
-  MotionGuess motion_;           // of the left camera, last frame to this one
+  MotionGuess motion_;  // of the left camera, last frame to this one
   std::vector<Track> tracks_;
   std::vector<Track> previous_;  // the same tracks, index by index, before this frame
   std::vector<ReferencePatch> patches_;

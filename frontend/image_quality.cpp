@@ -9,7 +9,7 @@ ImageQuality measure_quality(const GreyLevel& image) {
   std::int64_t count = 0;
   for (int row = 0; row < image.height; row += kRowStep) {
     const std::uint8_t* p = image.origin + row * image.stride;
-    int row_sum = 0;      // fits: 2^31 / 255^2 is 33000 pixels
+    int row_sum = 0;  // fits: 2^31 / 255^2 is 33000 pixels
     int row_squares = 0;
     for (int column = 1; column + 1 < image.width; ++column) {
       const int difference = p[column + 1] - p[column - 1];

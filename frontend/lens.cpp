@@ -51,8 +51,8 @@ double find_max_radius(LensModel model, const Eigen::Vector4d& k) {
   double radius = kStep;
   for (; radius < limit; radius += kStep) {
     const double r2 = radius * radius;
-    const double slope = model == LensModel::equidistant ? distort_angle(k, radius).slope
-                                                         : 1.0 + r2 * (3.0 * k[0] + r2 * 5.0 * k[1]);
+    const double slope =
+        model == LensModel::equidistant ? distort_angle(k, radius).slope : 1.0 + r2 * (3.0 * k[0] + r2 * 5.0 * k[1]);
     if (slope <= 0.0) break;
   }
   return radius - kStep;

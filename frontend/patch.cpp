@@ -43,9 +43,8 @@ bool inside(const GreyLevel& level, const Warp& warp, float half) {
          warp.centre.x() + reach.x() <= high_x && warp.centre.y() + reach.y() <= high_y;
 }
 
-// Bilinear samples of an n x n patch under a warp; the caller has checked that it is inside. Fetching is kept apart from
-// arithmetic, which compilers then turn into vector code.
-// Leaves out `skip` rows above and below.
+// Bilinear samples of an n x n patch under a warp; the caller has checked that it is inside. Fetching is kept apart
+// from arithmetic, which compilers then turn into vector code. Leaves out `skip` rows above and below.
 template <int n, int skip = 0>
 void sample(const GreyLevel& level, const Warp& warp, float* out) {
   constexpr float kReach = 0.5F * (n - 1);
@@ -327,7 +326,8 @@ std::optional<PatchLevel::Step> PatchLevel::step_affine(const GreyLevel& level, 
 
   // The warp has already gone this far from its prior, in the parameters of the step.
   const Eigen::Matrix2f deviation = Eigen::Matrix2f::Identity() - prior.inverse() * warp.affine;
-  residual.tail<4>() -= kAffinePrior * Eigen::Vector4f(deviation(0, 0), deviation(0, 1), deviation(1, 0), deviation(1, 1));
+  residual.tail<4>() -=
+      kAffinePrior * Eigen::Vector4f(deviation(0, 0), deviation(0, 1), deviation(1, 0), deviation(1, 1));
 
   const Vector6f step = scale * covariance_affine_ * residual;
   Eigen::Matrix2f change;

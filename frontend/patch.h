@@ -14,8 +14,8 @@ namespace ear {
 
 /// Where a patch lies in an image: the pixel of its centre, and the affine map from patch to image around it.
 struct Warp {
-  Eigen::Vector2f centre = Eigen::Vector2f::Zero();         ///< [px]
-  Eigen::Matrix2f affine = Eigen::Matrix2f::Identity();     ///< patch offset to image offset
+  Eigen::Vector2f centre = Eigen::Vector2f::Zero();      ///< [px]
+  Eigen::Matrix2f affine = Eigen::Matrix2f::Identity();  ///< patch offset to image offset
 };
 
 /// A patch at one level of a pyramid. Offsets of its pixels from the centre are -7.5, -6.5, ... 7.5.
@@ -33,8 +33,8 @@ class PatchLevel {
   [[nodiscard]] float corner_strength() const { return corner_strength_; }
 
   struct Step {
-    float correlation = -1.0F;                          ///< zero-mean normalized *before* the step, -1 to 1
-    Eigen::Vector2f moved = Eigen::Vector2f::Zero();    ///< of the centre [px of this level]
+    float correlation = -1.0F;                        ///< zero-mean normalized *before* the step, -1 to 1
+    Eigen::Vector2f moved = Eigen::Vector2f::Zero();  ///< of the centre [px of this level]
   };
 
   /// One Gauss-Newton step of the position, `scale` times as long; nothing if the patch leaves the image or does not
@@ -64,10 +64,10 @@ class PatchLevel {
   alignas(16) Pixels gradient_x_;
   alignas(16) Pixels gradient_y_;
   float mean_ = 0.0F;
-  float energy_ = 0.0F;   // sum of value^2
+  float energy_ = 0.0F;  // sum of value^2
   float corner_strength_ = 0.0F;
-  Vector6f J_sum_;        // J^T 1
-  Vector6f J_value_;      // J^T value
+  Vector6f J_sum_;    // J^T 1
+  Vector6f J_value_;  // J^T value
   Eigen::Matrix2f covariance_position_;
   Matrix6f covariance_affine_;
 };

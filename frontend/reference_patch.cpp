@@ -6,15 +6,15 @@
 namespace ear {
 namespace {
 
-constexpr int kCoarseSteps = 5;        // on each level above the base
-constexpr float kCoarseSettled = 0.1F; // [px of the level]
-constexpr int kPositionSteps = 6;      // on the base level, before the affine map is freed
+constexpr int kCoarseSteps = 5;         // on each level above the base
+constexpr float kCoarseSettled = 0.1F;  // [px of the level]
+constexpr int kPositionSteps = 6;       // on the base level, before the affine map is freed
 constexpr float kPositionSettled = 0.25F;
 constexpr int kAffineSteps = 6;
 constexpr float kAffineSettled = 0.02F;
 constexpr float kMaxUnsettled = 0.1F;  // [px] a last step this long is still a match: noise keeps weak patches moving
-constexpr float kMinScale = 0.3F;       // of steps that overshoot
-constexpr float kMaxStretch = 2.5F;  // of the affine map: beyond, the patch is no longer what it was
+constexpr float kMinScale = 0.3F;      // of steps that overshoot
+constexpr float kMaxStretch = 2.5F;    // of the affine map: beyond, the patch is no longer what it was
 
 Warp scaled(const Warp& warp, int level) { return {warp.centre / static_cast<float>(1 << level), warp.affine}; }
 
@@ -24,8 +24,8 @@ bool plausible(const Eigen::Matrix2f& affine) {
          affine.cwiseAbs().maxCoeff() < kMaxStretch;
 }
 
-// Steps until one is shorter than `short_enough`, and returns the last. Where the image is sharper than the patch, steps
-// overshoot: each then undoes a part of the one before, which tells how much shorter they should be.
+// Steps until one is shorter than `short_enough`, and returns the last. Where the image is sharper than the patch,
+// steps overshoot: each then undoes a part of the one before, which tells how much shorter they should be.
 template <class DoStep>
 std::optional<PatchLevel::Step> settle(int max_steps, float short_enough, DoStep&& do_step) {
   float scale = 1.0F;
@@ -76,12 +76,12 @@ std::optional<ReferencePatch::Match> ReferencePatch::align(const ImagePyramid& p
   const PatchLevel& base = levels_.front();
   const GreyLevel& image = pyramid.level(0);
   // A start on the base level is close enough for the full step.
-  const auto placed = start_level == 0 ? std::optional<PatchLevel::Step>(PatchLevel::Step{}) : settle(kPositionSteps, kPositionSettled,
-                             [&](float scale) { return base.step_position(image, scale, warp); });
+  const auto placed = start_level == 0 ? std::optional<PatchLevel::Step>(PatchLevel::Step{})
+                                       : settle(kPositionSteps, kPositionSettled,
+                                                [&](float scale) { return base.step_position(image, scale, warp); });
   if (!placed) return std::nullopt;
-  const auto settled = settle(kAffineSteps, kAffineSettled, [&](float scale) {
-    return base.step_affine(image, start.affine, scale, warp);
-  });
+  const auto settled = settle(kAffineSteps, kAffineSettled,
+                              [&](float scale) { return base.step_affine(image, start.affine, scale, warp); });
   if (!settled || !plausible(warp.affine)) return std::nullopt;
   if (settled->moved.norm() > kMaxUnsettled || settled->correlation < kMinCorrelation) return std::nullopt;
   return Match{warp, settled->correlation};

@@ -1,4 +1,5 @@
-// What two calibrated cameras say about one point: transfer across the pair, inverse depth, distance to the epipolar line.
+// What two calibrated cameras say about one point: transfer across the pair, inverse depth, distance to the epipolar
+// line.
 #pragma once
 
 #include <Eigen/Core>
@@ -20,8 +21,8 @@ struct Transfer {
 
 /// A matched pair of rays, read as a point.
 struct StereoPoint {
-  double inverse_depth = 0.0;       ///< 1/z in the left camera [1/m]; noise makes it negative for very far points
-  double epipolar_distance = 0.0;   ///< distance of the right ray from the epipolar line, normalized coordinates
+  double inverse_depth = 0.0;      ///< 1/z in the left camera [1/m]; noise makes it negative for very far points
+  double epipolar_distance = 0.0;  ///< distance of the right ray from the epipolar line, normalized coordinates
 };
 
 /// The inverse depth that brings `x0` closest to `x1`; nothing if the pair of rays says nothing about depth.

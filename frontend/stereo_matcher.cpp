@@ -11,8 +11,8 @@ namespace {
 
 constexpr int kSearchLevel = 2;
 constexpr int kRefineLevel = 1;
-constexpr double kSearchStep_px = 4.0;       // on the base image: one pixel of the search level
-constexpr double kMaxDisparityShare = 0.2;   // of the image's width
+constexpr double kSearchStep_px = 4.0;         // on the base image: one pixel of the search level
+constexpr double kMaxDisparityShare = 0.2;     // of the image's width
 constexpr float kMinSearchCorrelation = 0.5F;  // on the search level
 constexpr float kRivalMargin = 0.1F;           // a second peak this close to the first is looked at as well
 constexpr float kAmbiguous = 0.03F;            // two places that differ less are not told apart
@@ -29,7 +29,8 @@ StereoMatcher::StereoMatcher(const CameraCalibration& left, const CameraCalibrat
   const Eigen::Isometry3d T_C1C0 = right.T_BC.inverse() * left.T_BC;
   right_from_left_ = {T_C1C0.linear(), T_C1C0.translation()};
   const double baseline = T_C1C0.translation().norm();
-  if (!(baseline > 1e-4)) throw std::invalid_argument("cameras: the two cameras of the stereo pair are at the same place");
+  if (!(baseline > 1e-4))
+    throw std::invalid_argument("cameras: the two cameras of the stereo pair are at the same place");
   inverse_depth_per_pixel_ = 1.0 / (baseline * right_lens_.focal_px());
   max_inverse_depth_ =
       std::min(1.0 / nearest_depth, kMaxDisparityShare * static_cast<double>(right.width) * inverse_depth_per_pixel_);

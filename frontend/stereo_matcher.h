@@ -14,9 +14,9 @@ namespace ear {
 
 /// A feature seen by both cameras.
 struct StereoMatch {
-  Eigen::Vector2d right = Eigen::Vector2d::Zero();                  ///< normalized coordinates
-  double inverse_depth = 0.0;                                       ///< 1/z in the left camera [1/m], not negative
-  Eigen::Matrix2f right_from_left = Eigen::Matrix2f::Identity();    ///< affine map between the two images here
+  Eigen::Vector2d right = Eigen::Vector2d::Zero();                ///< normalized coordinates
+  double inverse_depth = 0.0;                                     ///< 1/z in the left camera [1/m], not negative
+  Eigen::Matrix2f right_from_left = Eigen::Matrix2f::Identity();  ///< affine map between the two images here
 };
 
 class StereoMatcher {

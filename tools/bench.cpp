@@ -1,5 +1,5 @@
-// ear bench RECORDING: what the pipeline costs for each stereo frame, beside the floor measured on the same images in the
-// same run (tools/floor.h). One thread; CPU time.
+// ear bench RECORDING: what the pipeline costs for each stereo frame, beside the floor measured on the same images in
+// the same run (tools/floor.h). One thread; CPU time.
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>

@@ -8,8 +8,8 @@
 
 namespace ear::tools {
 
-/// Two image pyramids, one temporal and one stereo pass of pyramidal Lucas-Kanade: 15x15 window, 3 levels above the base,
-/// at most 10 iterations. Choosing the points is not part of it.
+/// Two image pyramids, one temporal and one stereo pass of pyramidal Lucas-Kanade: 15x15 window, 3 levels above the
+/// base, at most 10 iterations. Choosing the points is not part of it.
 class Floor {
  public:
   explicit Floor(int points) : points_(points) {}

@@ -30,8 +30,10 @@ class SeenRectangle {
     const double distance = normal_C_.dot(corner_C_) / normal_C_.dot(ray_C);
     if (!(distance > 1e-3 && distance < best.distance)) return;
     const Eigen::Vector3d on_C = distance * ray_C - corner_C_;
-    const Eigen::Vector2d texel = Eigen::Vector2d(on_C.dot(along_u_C_), on_C.dot(along_v_C_)) / rectangle_->metres_per_texel;
-    if (texel.minCoeff() < 0.0 || texel.x() > rectangle_->texture.cols - 2 || texel.y() > rectangle_->texture.rows - 2) {
+    const Eigen::Vector2d texel =
+        Eigen::Vector2d(on_C.dot(along_u_C_), on_C.dot(along_v_C_)) / rectangle_->metres_per_texel;
+    if (texel.minCoeff() < 0.0 || texel.x() > rectangle_->texture.cols - 2 ||
+        texel.y() > rectangle_->texture.rows - 2) {
       return;
     }
     best = {distance, texel, rectangle_};
@@ -61,7 +63,8 @@ float texture_at(const Hit& hit) {
   const auto b = static_cast<float>(hit.texel.y() - v);
   const cv::Mat& t = hit.rectangle->texture;
   const auto at = [&](int row, int column) { return static_cast<float>(t.at<std::uint8_t>(row, column)); };
-  return (1.0F - b) * ((1.0F - a) * at(v, u) + a * at(v, u + 1)) + b * ((1.0F - a) * at(v + 1, u) + a * at(v + 1, u + 1));
+  return (1.0F - b) * ((1.0F - a) * at(v, u) + a * at(v, u + 1)) +
+         b * ((1.0F - a) * at(v + 1, u) + a * at(v + 1, u + 1));
 }
 
 }  // namespace
@@ -87,8 +90,7 @@ cv::Mat random_texture(int width, int height, unsigned seed, double contrast) {
 }
 
 Camera::Camera(const CameraCalibration& calibration)
-    : calibration_(calibration),
-      rays_(calibration.height * kSubpixels, calibration.width * kSubpixels, CV_64FC2) {
+    : calibration_(calibration), rays_(calibration.height * kSubpixels, calibration.width * kSubpixels, CV_64FC2) {
   const Lens lens(calibration);
   for (int row = 0; row < rays_.rows; ++row) {
     for (int column = 0; column < rays_.cols; ++column) {
@@ -141,7 +143,8 @@ std::vector<CameraCalibration> test_stereo_pair(LensModel lens) {
   CameraCalibration right = left;
   right.fu = 201.5;
   right.cu = 161.2;
-  right.T_BC = Eigen::Translation3d(0.08, 0.001, -0.0005) * Eigen::AngleAxisd(0.01, Eigen::Vector3d(0.3, 0.8, -0.5).normalized());
+  right.T_BC = Eigen::Translation3d(0.08, 0.001, -0.0005) *
+               Eigen::AngleAxisd(0.01, Eigen::Vector3d(0.3, 0.8, -0.5).normalized());
   return {left, right};
 }
 
@@ -165,7 +168,8 @@ TexturedRectangle wall(double distance, unsigned seed) {
   TexturedRectangle rectangle;
   rectangle.metres_per_texel = 0.004 * distance;  // about a pixel of the test cameras
   rectangle.texture = random_texture(1000, 800, seed);
-  rectangle.corner_W = Eigen::Vector3d(-500.0 * rectangle.metres_per_texel, -400.0 * rectangle.metres_per_texel, distance);
+  rectangle.corner_W =
+      Eigen::Vector3d(-500.0 * rectangle.metres_per_texel, -400.0 * rectangle.metres_per_texel, distance);
   return rectangle;
 }
 

@@ -110,7 +110,8 @@ TEST_CASE("flow check: a camera that stands or only turns keeps all of a static 
         CAPTURE(rotation_known);
         Example example = make_example(with_depth, angle, Eigen::Vector3d::Zero(), 3);
         for (std::size_t i = 0; i < example.flows.size(); ++i) {
-          if (example.moves[i]) example.flows[i].x1 = (example.motion.R_10 * example.flows[i].x0.homogeneous()).hnormalized();
+          if (example.moves[i])
+            example.flows[i].x1 = (example.motion.R_10 * example.flows[i].x0.homogeneous()).hnormalized();
         }
         FlowCheck check(2.0 * kPixel);
         const Transfer guess = rotation_known ? example.motion : Transfer{};

@@ -223,7 +223,8 @@ TEST_CASE("front end: black, white and returning images") {
   const cv::Mat scene = Camera(cameras[0]).render(at({0, 0, 0}), {wall(2.0, 28)});
   const cv::Mat other = Camera(cameras[1]).render(at({0, 0, 0}), {wall(2.0, 28)});
   std::set<std::uint64_t> first;
-  for (const auto& feature : frontend.process({0, view_of(scene), view_of(other)}, {}).features) first.insert(feature.id);
+  for (const auto& feature : frontend.process({0, view_of(scene), view_of(other)}, {}).features)
+    first.insert(feature.id);
   CHECK(first.size() == kFeatures);
   CHECK(frontend.quality().brightness == doctest::Approx(cv::mean(scene)[0]).epsilon(0.02));
   CHECK(frontend.quality().sharpness > 10.0);
