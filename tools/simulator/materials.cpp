@@ -31,23 +31,24 @@ class Canvas {
 
   void fill(double grey) { image_ = grey; }
 
-  // Smooth random variation with features of this size [m], different along both axes if asked for.
-  void noise(double amplitude, double size_x, double size_y) {
-    const cv::Size cells(std::max(4, static_cast<int>(image_.cols * texel_ / size_x)),
-                         std::max(4, static_cast<int>(image_.rows * texel_ / size_y)));
-    cv::Mat coarse(cells, CV_32FC1);
-    cv::RNG generator(rng_());
-    generator.fill(coarse, cv::RNG::NORMAL, 0.0, amplitude);
-    const bool per_pixel = cells.width >= image_.cols && cells.height >= image_.rows;
-    cv::Mat fine;
-    cv::resize(coarse, fine, image_.size(), 0.0, 0.0, per_pixel ? cv::INTER_AREA : cv::INTER_CUBIC);
-    image_ += fine;
-  }
-  // Octaves of noise from `largest` down to `smallest` [m], each weaker than the one before.
+  // Random variation with features from `largest` down to `smallest` [m], each octave weaker than the one before; along
+  // x all is longer by `stretch`.
   void fractal(double amplitude, double largest, double smallest, double persistence = 0.75, double stretch = 1.0) {
+    cv::RNG generator(rng_());
+    cv::Mat sum;
     for (double size = largest; size >= smallest; size *= 0.5, amplitude *= persistence) {
-      noise(amplitude, size * stretch, size);
+      cv::Mat octave(cells(height_, size), cells(width_, size * stretch), CV_32FC1);
+      generator.fill(octave, cv::RNG::NORMAL, 0.0, amplitude);
+      if (!sum.empty()) {
+        cv::Mat finer;
+        cv::resize(sum, finer, octave.size(), 0.0, 0.0, cv::INTER_CUBIC);
+        octave += finer;
+      }
+      sum = octave;
     }
+    cv::Mat fine;
+    cv::resize(sum, fine, image_.size(), 0.0, 0.0, sum.cols > image_.cols ? cv::INTER_AREA : cv::INTER_CUBIC);
+    image_ += fine;
   }
 
   // All shapes: metres from the top left corner, added to or blended over what is there.
@@ -91,6 +92,10 @@ class Canvas {
   static constexpr int kShift = 4;  // drawing in sixteenths of a pixel
   static constexpr double kUnit = 16.0;
 
+  [[nodiscard]] static int cells(double length, double size) {
+    constexpr int kFewest = 4;
+    return std::max(kFewest, static_cast<int>(length / size));
+  }
   [[nodiscard]] int pixel(double metres) const { return static_cast<int>(std::lround(metres / texel_)); }
   [[nodiscard]] cv::Point point(double x, double y) const {
     return {static_cast<int>(std::lround(x / texel_ * kUnit)), static_cast<int>(std::lround(y / texel_ * kUnit))};

@@ -12,12 +12,14 @@ namespace ear::simulator {
 namespace {
 
 // The sub-pictures: offsets within the pixel and within the exposure, in fifths. Each fifth of the pixel's width, of
-// its height and of the exposure is met once; right-left and up-down do not correlate.
+// its height and of the exposure is met once. They lie symmetrically about the middle, so that a blurred point has its
+// middle where a sharp one would be. Offsets and instants must correlate then: every second pixel takes its offsets
+// negated, and the picture as a whole has no correlation.
 struct SubPicture {
   int right, down, late;
 };
 constexpr int kSubPictures = 5;
-constexpr std::array<SubPicture, kSubPictures> kPattern{{{-1, -2, 0}, {2, -1, -2}, {0, 0, 2}, {-2, 1, -1}, {1, 2, 1}}};
+constexpr std::array<SubPicture, kSubPictures> kPattern{{{-1, -2, 1}, {2, -1, 2}, {0, 0, 0}, {-2, 1, -2}, {1, 2, -1}}};
 
 constexpr double fraction(int fifths) { return static_cast<double>(fifths) / kSubPictures; }
 
@@ -254,7 +256,8 @@ Renderer::Renderer(const Scene& scene, const Appearance& appearance, const std::
       Rays rays;
       for (int v = 0; v < camera.height; ++v) {
         for (int u = 0; u < camera.width; ++u) {
-          const Eigen::Vector2d ray = to_ray(camera, {u + fraction(sub.right), v + fraction(sub.down)});
+          const double side = (u + v) % 2 == 0 ? 1.0 : -1.0;
+          const Eigen::Vector2d ray = to_ray(camera, {u + side * fraction(sub.right), v + side * fraction(sub.down)});
           rays.x.push_back(static_cast<float>(ray.x()));
           rays.y.push_back(static_cast<float>(ray.y()));
         }

@@ -1,0 +1,170 @@
+// Simulated recordings on disk: read back by the project's own reader, refused where they would mix, the same every
+// time.
+#include <doctest/doctest.h>
+#include <unistd.h>
+
+#include <Eigen/Geometry>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <optional>
+#include <sstream>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "src/recording/recording.h"
+#include "tools/simulator/recording_writer.h"
+#include "tools/simulator/simulation.h"
+
+namespace {
+
+namespace fs = std::filesystem;
+using namespace ear::simulator;
+
+// A folder of its own for each case, gone afterwards.
+class TemporaryFolder {
+ public:
+  TemporaryFolder() : path_(fs::temp_directory_path() / ("ear_simulator_" + std::to_string(getpid()))) {
+    fs::remove_all(path_);
+    fs::create_directories(path_);
+  }
+  ~TemporaryFolder() { fs::remove_all(path_); }
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  [[nodiscard]] fs::path operator/(const std::string& name) const { return path_ / name; }
+
+ private:
+  fs::path path_;
+};
+
+Options short_drive(std::uint64_t seed) {
+  Options options;
+  options.seed = seed;
+  options.duration = 0.3;
+  options.camera_rate_hz = 10.0;
+  options.tracks = false;
+  return options;
+}
+
+std::string bytes_of(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  REQUIRE(stream);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+std::vector<std::string> lines_of(const fs::path& file) {
+  std::istringstream stream(bytes_of(file));
+  std::vector<std::string> lines;
+  for (std::string line; std::getline(stream, line);) lines.push_back(line);
+  return lines;
+}
+
+void no_progress(std::size_t, std::size_t) {}
+
+}  // namespace
+
+TEST_CASE("recording: the reader gets back calibration and samples") {
+  const TemporaryFolder folder;
+  Options options = short_drive(41);
+  options.duration = 4.0;
+  const Simulation simulation(options);
+  write_recording(simulation, folder / "r");
+
+  ear::Recording recording(folder / "r");
+  const ear::Calibration& read = recording.calibration();
+  const ear::Calibration& told = simulation.calibration();
+  REQUIRE(read.encoder);
+  REQUIRE(read.lasers);
+  CHECK((read.encoder->T_BO.matrix() - told.encoder->T_BO.matrix()).norm() < 1e-9);
+  CHECK(read.encoder->wheel_radius[0] == doctest::Approx(told.encoder->wheel_radius[0]).epsilon(1e-8));
+  CHECK(read.encoder->wheel_radius[1] == doctest::Approx(told.encoder->wheel_radius[1]).epsilon(1e-8));
+  CHECK(read.encoder->wheel_separation == doctest::Approx(told.encoder->wheel_separation).epsilon(1e-8));
+  CHECK(read.encoder->wraps);
+  CHECK(read.imu.gyro_noise == told.imu.gyro_noise);
+  CHECK(read.imu.accel_random_walk == told.imu.accel_random_walk);
+  for (std::size_t i = 0; i < 3; ++i) {
+    CHECK((read.lasers->beams[i].d_B - told.lasers->beams[i].d_B).norm() < 1e-9);
+    CHECK((read.lasers->beams[i].p_BL - told.lasers->beams[i].p_BL).norm() < 1e-8);
+  }
+
+  std::size_t imu = 0;
+  std::size_t encoders = 0;
+  std::size_t lasers = 0;
+  while (const auto sample = recording.next()) {
+    if (const auto* s = std::get_if<ear::ImuSample>(&*sample)) {
+      const ear::ImuSample& expected = simulation.imu().at(imu++);
+      CHECK(s->t_ns == expected.t_ns);
+      CHECK((s->gyro_B - expected.gyro_B).norm() < 1e-8);
+      CHECK((s->accel_B - expected.accel_B).norm() < 1e-8);
+    } else if (const auto* e = std::get_if<ear::EncoderSample>(&*sample)) {
+      CHECK(e->left_count == simulation.encoders().at(encoders).left_count);
+      CHECK(e->right_count == simulation.encoders().at(encoders++).right_count);
+    } else if (const auto* l = std::get_if<ear::LaserSample>(&*sample)) {
+      CHECK(std::abs(l->range[2] - simulation.lasers().at(lasers++).range[2]) < 6e-5);
+    }
+  }
+  CHECK(imu == simulation.imu().size());
+  CHECK(encoders == simulation.encoders().size());
+  CHECK(lasers == simulation.lasers().size());
+}
+
+TEST_CASE("recording: truth rows follow EuRoC's order") {
+  const TemporaryFolder folder;
+  const Simulation simulation(short_drive(42));
+  write_recording(simulation, folder / "r");
+  const std::vector<std::string> lines = lines_of(folder / "r/mav0/state_groundtruth_estimate0/data.csv");
+  REQUIRE(lines.size() == simulation.imu().size() + 1);
+  std::vector<double> row;
+  std::istringstream fields(lines[11]);
+  for (std::string field; std::getline(fields, field, ',');) row.push_back(std::stod(field));
+  REQUIRE(row.size() == 17);
+  const Truth truth = simulation.truth(simulation.imu()[10].t_ns);
+  CHECK((Eigen::Vector3d(row[1], row[2], row[3]) - truth.p_WB).norm() < 1e-8);
+  CHECK((Eigen::Quaterniond(row[4], row[5], row[6], row[7]).toRotationMatrix() - truth.R_WB).norm() < 1e-9);
+  CHECK((Eigen::Vector3d(row[8], row[9], row[10]) - truth.v_W).norm() < 1e-8);
+  CHECK((Eigen::Vector3d(row[11], row[12], row[13]) - truth.b_g).norm() < 1e-8);
+  CHECK((Eigen::Vector3d(row[14], row[15], row[16]) - truth.b_a).norm() < 1e-8);
+  CHECK(lines_of(folder / "r/mav0/truth_extra.csv").size() == lines.size());
+}
+
+TEST_CASE("recording: what is there already is not mixed with something else") {
+  const TemporaryFolder folder;
+  write_recording(Simulation(short_drive(43)), folder / "r");
+  CHECK_THROWS_WITH_AS(write_recording(Simulation(short_drive(44)), folder / "r"), doctest::Contains("already"),
+                       std::runtime_error);
+}
+
+TEST_CASE("recording: pictures do not depend on the threads, and serve the other calibration, too") {
+  const TemporaryFolder folder;
+  Options options = short_drive(45);
+  const Simulation imperfect(options);
+  options.perfect_calibration = true;
+  const Simulation perfect(options);
+  write_recording(imperfect, folder / "imperfect");
+  std::size_t told = 0;
+  render_images(imperfect, folder / "imperfect", 1, [&](std::size_t done, std::size_t total) {
+    CHECK(done == ++told);
+    CHECK(total == 2 * imperfect.frame_times().size());
+  });
+  CHECK(told == 2 * imperfect.frame_times().size());
+  render_images(imperfect, folder / "threads", 3, no_progress);
+  write_recording(perfect, folder / "perfect");
+  link_images(perfect, folder / "perfect", folder / "imperfect");
+  for (const ear::TimeNs t_ns : imperfect.frame_times()) {
+    for (const std::size_t camera : {0U, 1U}) {
+      const std::string bytes = bytes_of(image_path(folder / "imperfect", camera, t_ns));
+      CHECK(bytes.size() > 50000);
+      CHECK(bytes == bytes_of(image_path(folder / "threads", camera, t_ns)));
+      CHECK(bytes == bytes_of(image_path(folder / "perfect", camera, t_ns)));
+    }
+  }
+  CHECK(bytes_of(folder / "perfect/mav0/imu0/data.csv") == bytes_of(folder / "imperfect/mav0/imu0/data.csv"));
+  CHECK(bytes_of(folder / "perfect/mav0/cam0/sensor.yaml") != bytes_of(folder / "imperfect/mav0/cam0/sensor.yaml"));
+
+  const Simulation other(short_drive(46));
+  CHECK_THROWS_WITH_AS(link_images(other, folder / "other", folder / "imperfect"), doctest::Contains("seed: 46"),
+                       std::runtime_error);
+  CHECK_THROWS_WITH_AS(link_images(other, folder / "other", folder / "nowhere"), doctest::Contains("simulation.yaml"),
+                       std::runtime_error);
+}
