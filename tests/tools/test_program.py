@@ -68,16 +68,19 @@ class EndToEnd(unittest.TestCase):
             self.run_ear("simulate", "flat1", "--seed", "5", "--duration", "6", "--out", recording)
             self.run_ear("check", recording)
             self.run_ear("run", recording, "--out", output)
-            figures = json.loads(self.run_ear("evaluate", output, recording, "--json", "--report", report))
+            evaluation = json.loads(self.run_ear("evaluate", output, recording, "--json", "--report", report))
 
             with (output / "states.csv").open(encoding="utf-8") as states:
                 rows = list(csv.DictReader(states))
             poses = (output / "estimate.tum").read_text(encoding="utf-8").splitlines()
-            self.assertGreater(len(rows), 60)
+            self.assertGreater(len(rows), 120)
             self.assertEqual(len(rows), sum(not pose.startswith("#") for pose in poses))
-            self.assertTrue(json.loads((output / "summary.json").read_text(encoding="utf-8")))
+            self.assertEqual(json.loads((output / "summary.json").read_text())["counts"]["estimates"], len(rows))
             self.assertIn("<svg", report.read_text(encoding="utf-8"))
-            self.assertTrue(figures)
+            figures = evaluation["estimates"][0]
+            self.assertGreater(figures["coverage"], 0.7)  # after about a second of standing
+            self.assertGreater(figures["length_m"], 1.0)
+            self.assertLess(figures["ate_rmse_m"], 0.02)
 
 
 if __name__ == "__main__":
