@@ -28,6 +28,7 @@ void simulate(const SimulateArguments& args) {
   simulator::Options options = args.options;
   options.tracks = false;
   const simulator::Simulation simulation(options);
+  if (!args.images_from.empty()) simulator::require_same_pictures(simulation, args.images_from);
   simulator::write_recording(simulation, args.out);
 
   if (!args.images_from.empty()) {
@@ -61,7 +62,8 @@ void add_simulate_command(CLI::App& app) {
   command->footer(list_of_sequences());
   command->add_option("sequence", args->options.sequence, "what it does (below)")->required();
   command->add_option("--out", args->out, "folder of the recording; must not hold one yet")->required();
-  command->add_option("--seed", args->options.seed, "varies noise, textures and details of the motion");
+  command->add_option("--seed", args->options.seed, "varies noise, textures and details of the motion")
+      ->capture_default_str();
   command->add_option("--duration", args->options.duration, "[s] stop earlier, or keep standing at the end");
   command->add_option("--camera-rate", args->options.camera_rate_hz, "[Hz]")->capture_default_str();
   command->add_flag("--perfect-calibration", args->options.perfect_calibration,
@@ -70,6 +72,7 @@ void add_simulate_command(CLI::App& app) {
   command->add_option("--images-from", args->images_from, "link the pictures of this recording of the same simulation")
       ->excludes(no_images);
   command->add_option("--threads", args->threads, "that render; the pictures do not depend on it")
+      ->capture_default_str()
       ->check(CLI::PositiveNumber);
   command->callback([args] { simulate(*args); });
 }

@@ -269,7 +269,7 @@ void render_images(const Simulation& simulation, const fs::path& directory, int 
   if (failure) std::rethrow_exception(failure);
 }
 
-void link_images(const Simulation& simulation, const fs::path& directory, const fs::path& other) {
+void require_same_pictures(const Simulation& simulation, const fs::path& other) {
   const fs::path origin = origin_file(other);
   std::ifstream file(origin);
   if (!file) throw std::runtime_error(origin.string() + ": cannot be read; is that a simulated recording?");
@@ -282,6 +282,9 @@ void link_images(const Simulation& simulation, const fs::path& directory, const 
                                "'");
     }
   }
+}
+
+void link_images(const Simulation& simulation, const fs::path& directory, const fs::path& other) {
   for (std::size_t camera = 0; camera < simulation.calibration().cameras.size(); ++camera) {
     fs::create_directories(image_path(directory, camera, 0).parent_path());
     for (const TimeNs t_ns : simulation.frame_times()) {

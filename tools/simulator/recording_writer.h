@@ -25,8 +25,11 @@ using Progress = std::function<void(std::size_t done, std::size_t total)>;
 void render_images(const Simulation& simulation, const std::filesystem::path& directory, int threads,
                    const Progress& progress);
 
-/// Uses the pictures of another recording of the same simulation (hard links, or copies across file systems). Throws
-/// std::runtime_error, naming the file and the key, if the two were not made by the same simulation.
+/// Throws std::runtime_error, naming the file and what it says, unless `other` holds the pictures that this simulation
+/// would render.
+void require_same_pictures(const Simulation& simulation, const std::filesystem::path& other);
+
+/// Uses the pictures of such a recording: hard links, or copies across file systems.
 void link_images(const Simulation& simulation, const std::filesystem::path& directory,
                  const std::filesystem::path& other);
 
