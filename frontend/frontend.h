@@ -30,11 +30,13 @@ struct ImageQuality {
   double coverage = 0.0;    ///< share of the image's grid cells that hold a feature, 0 to 1
 };
 
-/// Wall-clock time spent in each step of the last frame [s].
+/// Wall-clock time spent in each step of the last frame [s]. `detect` includes the first stereo search of new features.
 struct FrontendTiming {
   double pyramid = 0.0, track = 0.0, detect = 0.0, stereo = 0.0, reject = 0.0;
 };
 
+/// Runs on the calling thread. Library calls may use OpenCV's threads unless the program says cv::setNumThreads(1); the
+/// result is the same bit for bit.
 class Frontend {
  public:
   /// Throws std::invalid_argument if there is no camera or a calibration is unusable.

@@ -1,5 +1,6 @@
 #include <doctest/doctest.h>
 
+#include <array>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <random>
@@ -69,6 +70,34 @@ TEST_CASE("patch: a shift is found to a few hundredths of a pixel, from pixels a
     }
   }
   CHECK(std::sqrt(squares / count) < 0.05);
+}
+
+TEST_CASE("patch: one step goes most of the way, whatever the exposure") {
+  const cv::Mat image = random_texture(320, 240, 7);
+  const ImagePyramid before = pyramid_of(image);
+  const Eigen::Vector2f shift(0.4F, -0.3F);
+  for (const double gain : {0.5, 1.0, 1.5}) {
+    CAPTURE(gain);
+    cv::Mat moved = warped(image, Eigen::Matrix2f::Identity(), shift);
+    moved.convertTo(moved, CV_8U, gain, 128.0 * (1.0 - gain));
+    const ImagePyramid after = pyramid_of(moved);
+    float position_error = 0.0F;
+    float affine_error = 0.0F;
+    const std::array<float, 5> columns{60.5F, 110.5F, 160.5F, 210.5F, 260.5F};
+    for (const float u : columns) {
+      const Eigen::Vector2f at(u, 120.5F);
+      PatchLevel patch;
+      REQUIRE(patch.capture(before.level(0), at));
+      Warp warp{at, Eigen::Matrix2f::Identity()};
+      REQUIRE(patch.step_position(after.level(0), 1.0F, warp));
+      position_error += (warp.centre - at - shift).norm() / columns.size();
+      warp = {at, Eigen::Matrix2f::Identity()};
+      REQUIRE(patch.step_affine(after.level(0), Eigen::Matrix2f::Identity(), 1.0F, warp));
+      affine_error += (warp.centre - at - shift).norm() / columns.size();
+    }
+    CHECK(position_error < 0.1F);
+    CHECK(affine_error < 0.1F);
+  }
 }
 
 TEST_CASE("patch: turn, stretch and shear are found along with the position") {

@@ -123,6 +123,14 @@ TEST_CASE("stereo: two different images have little in common") {
   CHECK(result.found < 0.03 * result.tried);
 }
 
+TEST_CASE("stereo: what is off the epipolar line is not a match") {
+  Pair pair({wall(1.0, 14)});
+  pair.cameras[1].T_BC.rotate(Eigen::AngleAxisd(0.02, Eigen::Vector3d::UnitX()));  // the images are 4 px too high
+  const Result result = search_all(pair);
+  CHECK(result.tried > 60);
+  CHECK(result.found < 0.03 * result.tried);
+}
+
 TEST_CASE("stereo: what is followed must be where it was") {
   const Pair pair({wall(1.0, 13)});
   const StereoMatcher matcher(pair.cameras[0], pair.cameras[1], kNearest);
