@@ -13,14 +13,17 @@ bool StandstillDetector::update(const FeatureFrame& frame, const ImuStatistics& 
                                 double max_gyro) {
   const bool imu_quiet = imu.duration > 0.8 * config_.duration && imu.gyro_spread < config_.max_gyro_spread &&
                          imu.accel_spread < config_.max_accel_spread && (imu.gyro_mean - gyro_bias).norm() < max_gyro;
-  if (!imu_quiet || since_ns_ == kMoving || common_flow_px(frame) > config_.max_flow_px) {
+  const double max_flow_px = standing_ ? config_.leave_flow_px : config_.max_flow_px;
+  if (!imu_quiet || since_ns_ == kMoving || common_flow_px(frame) > max_flow_px) {
     restart(frame);
     return false;
   }
-  return seconds_between(since_ns_, frame.t_ns) >= config_.duration;
+  standing_ = seconds_between(since_ns_, frame.t_ns) >= config_.duration;
+  return standing_;
 }
 
 void StandstillDetector::restart(const FeatureFrame& frame) {
+  standing_ = false;
   since_ns_ = frame.t_ns;
   reference_ = frame.features;
   std::sort(reference_.begin(), reference_.end(),

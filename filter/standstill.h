@@ -20,8 +20,6 @@ class StandstillDetector {
   /// [rad/s]: how far the mean rate may be from it. True if the vehicle has stood for config.duration.
   bool update(const FeatureFrame& frame, const ImuStatistics& imu, const Eigen::Vector3d& gyro_bias, double max_gyro);
 
-  void reset() { since_ns_ = kMoving; }
-
  private:
   static constexpr TimeNs kMoving = -1;
 
@@ -30,6 +28,7 @@ class StandstillDetector {
 
   StandstillConfig config_;
   double focal_px_;
+  bool standing_ = false;
   TimeNs since_ns_ = kMoving;                  ///< first frame of the present stillness
   std::vector<FeatureObservation> reference_;  ///< features of that frame, by ascending id
   std::array<std::vector<double>, 4> flow_;

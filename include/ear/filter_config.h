@@ -8,9 +8,10 @@ struct StandstillConfig {
   double duration = 0.5;           ///< [s] stillness before it is believed
   double max_gyro = 0.02;          ///< [rad/s] mean rate less the bias
   double max_gyro_at_start = 0.2;  ///< [rad/s] the same before the bias is known: the largest bias of any sensor
-  double max_gyro_spread = 0.06;   ///< [rad/s] standard deviation of the samples over `duration`, vibration included
-  double max_accel_spread = 0.6;   ///< [m/s^2] the same for the specific force
-  double max_flow_px = 0.3;        ///< [px] common motion of the features since the vehicle stopped
+  double max_gyro_spread = 0.15;   ///< [rad/s] standard deviation of the samples over `duration`, vibration included
+  double max_accel_spread = 3.0;   ///< [m/s^2] the same for the specific force
+  double max_flow_px = 0.5;        ///< [px] common motion of the features until the vehicle is said to stand
+  double leave_flow_px = 1.0;      ///< [px] common motion since it stopped that ends it: legs give under rotors
   double position_sigma = 1e-3;    ///< [m] how far a standing vehicle may shift
   double rotation_sigma = 5e-4;    ///< [rad]
   double velocity_sigma = 5e-3;    ///< [m/s]

@@ -39,6 +39,7 @@ EnableFor<C, StandstillConfig> visit(C& c, F&& f) {
   f("max_gyro_spread", c.max_gyro_spread);
   f("max_accel_spread", c.max_accel_spread);
   f("max_flow_px", c.max_flow_px);
+  f("leave_flow_px", c.leave_flow_px);
   f("position_sigma", c.position_sigma);
   f("rotation_sigma", c.rotation_sigma);
   f("velocity_sigma", c.velocity_sigma);

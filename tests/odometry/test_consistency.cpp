@@ -45,9 +45,16 @@ Nees run(const char* sequence, std::uint64_t seed, bool calibrate) {
   options.duration = kDuration;
   const simulator::Simulation simulation(options);
   FilterConfig config;
-  config.feature_sigma_px = options.track.sigma_px;
+  config.feature_sigma_px = 1.05 * options.track.sigma_px;  // linearization costs a little
   config.online_calibration.camera_extrinsics = calibrate;
   config.online_calibration.time_offset = calibrate;
+  // The priors are the distribution that the simulator draws from: a fixed size in a random direction, per axis.
+  config.prior.accel_bias = 0.03;
+  config.prior.camera_rotation = 0.2 * M_PI / 180.0 / std::sqrt(3.0);
+  config.prior.stereo_rotation = 0.02 * M_PI / 180.0 / std::sqrt(3.0);
+  config.prior.camera_position = 1e-5;
+  config.prior.stereo_position = 1e-5;
+  config.prior.time_offset = 1e-3;
   Filter filter(config, simulation.calibration());
 
   Nees nees;
