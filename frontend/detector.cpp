@@ -52,8 +52,7 @@ Eigen::Vector2f patch_centre(const cv::Point2f& pixel) { return {pixel.x + 0.5F,
 
 }  // namespace
 
-Detector::Detector(int width, int height, int max_features)
-    : width_(width), height_(height), columns_(1), rows_(1), cell_(1.0F), min_distance_(1.0F) {
+Detector::Detector(int width, int height, int max_features) : width_(width), height_(height) {
   cell_ = std::sqrt(static_cast<float>(width) * static_cast<float>(height) / static_cast<float>(max_features));
   cell_ = std::max(cell_, 2.0F * kMargin);
   columns_ = std::max(1, static_cast<int>(std::ceil(static_cast<float>(width) / cell_)));

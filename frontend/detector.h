@@ -37,11 +37,11 @@ class Detector {
 
   int width_;
   int height_;
-  int columns_;
-  int rows_;
-  float cell_;            // [px]
-  float min_distance_;    // [px]
-  std::size_t next_ = 0;  // cell to begin with: a different one each time
+  int columns_ = 1;
+  int rows_ = 1;
+  float cell_ = 1.0F;          // [px]
+  float min_distance_ = 1.0F;  // [px]
+  std::size_t next_ = 0;       // cell to begin with: a different one each time
 };
 
 }  // namespace ear

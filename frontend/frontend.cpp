@@ -19,13 +19,13 @@
 namespace ear {
 namespace {
 
-constexpr float kEdge_px = 8.0F;              // features closer to the image's edge are dropped
-constexpr float kMinTrackDistance_px = 5.0F;  // two tracks closer than this have become one
-constexpr double kFlowTolerance_px = 1.0;
-constexpr double kDisparitySigma_px = 1.0;  // for the depth's part of that tolerance
-constexpr double kMapStep_px = 4.0;         // of the finite differences of a predicted affine map
-constexpr int kLevelMeasured = 0;           // where to begin: with depth and a motion measured in this frame,
-constexpr int kLevelPredicted = 2;          // with a predicted rotation,
+constexpr float kEdgePx = 8.0F;              // features closer to the image's edge are dropped
+constexpr float kMinTrackDistancePx = 5.0F;  // two tracks closer than this have become one
+constexpr double kFlowTolerancePx = 1.0;
+constexpr double kDisparitySigmaPx = 1.0;  // for the depth's part of that tolerance
+constexpr double kMapStepPx = 4.0;         // of the finite differences of a predicted affine map
+constexpr int kLevelMeasured = 0;          // where to begin: with depth and a motion measured in this frame,
+constexpr int kLevelPredicted = 2;         // with a predicted rotation,
 constexpr int kLevelUnknown = ImagePyramid::kMaxLevels - 1;  // and without
 constexpr std::size_t kProbes = 24;                          // features that measure the motion for the others
 constexpr float kRefreshStretch = 1.3F;  // a feature that has grown or shrunk this much gets a new patch
@@ -120,7 +120,7 @@ Frontend::Impl::Impl(const FrontendConfig& config, std::vector<CameraCalibration
       cameras_(std::move(cameras)),
       lens_(first_of(cameras_)),
       detector_(cameras_.front().width, cameras_.front().height, std::max(config.max_features, 1)),
-      flow_check_(kFlowTolerance_px / lens_.focal_px()) {
+      flow_check_(kFlowTolerancePx / lens_.focal_px()) {
   if (config_.max_features < 1) throw std::invalid_argument("frontend: max_features must be positive");
   if (!(config_.nearest_depth > 0.0)) throw std::invalid_argument("frontend: nearest_depth must be positive");
   if (cameras_.size() > 1) stereo_.emplace(cameras_[0], cameras_[1], config_.nearest_depth);
@@ -187,7 +187,7 @@ void Frontend::Impl::track(const MotionPrediction& prediction) {
   for (std::size_t i = 0; i < tracks_.size(); ++i) {
     for (std::size_t j = 0; j < i && keep[i]; ++j) {
       const Eigen::Vector2f apart = tracks_[i].left.centre - tracks_[j].left.centre;
-      if (keep[j] && apart.squaredNorm() < kMinTrackDistance_px * kMinTrackDistance_px) keep[i] = 0;
+      if (keep[j] && apart.squaredNorm() < kMinTrackDistancePx * kMinTrackDistancePx) keep[i] = 0;
     }
   }
   drop(keep);
@@ -233,13 +233,13 @@ bool Frontend::Impl::track_one(Track& track, const Transfer& motion, int level) 
   if (!centre) return false;
   Warp start{centre->cast<float>(), track.left.affine};
   const Eigen::Vector2d pixel = track.left.centre.cast<double>();
-  const auto ray_right = lens_.to_normalized(pixel + Eigen::Vector2d(kMapStep_px, 0.0));
-  const auto ray_below = lens_.to_normalized(pixel + Eigen::Vector2d(0.0, kMapStep_px));
+  const auto ray_right = lens_.to_normalized(pixel + Eigen::Vector2d(kMapStepPx, 0.0));
+  const auto ray_below = lens_.to_normalized(pixel + Eigen::Vector2d(0.0, kMapStepPx));
   const auto right = ray_right ? move(*ray_right) : std::nullopt;
   const auto below = ray_below ? move(*ray_below) : std::nullopt;
   if (right && below) {
     Eigen::Matrix2d change;
-    change << (*right - *centre) / kMapStep_px, (*below - *centre) / kMapStep_px;
+    change << (*right - *centre) / kMapStepPx, (*below - *centre) / kMapStepPx;
     start.affine = change.cast<float>() * track.left.affine;
   }
 
@@ -248,7 +248,7 @@ bool Frontend::Impl::track_one(Track& track, const Transfer& motion, int level) 
   const Eigen::Vector2f& found = match->warp.centre;
   const GreyLevel& image = left_.level(0);
   const auto in = [](float value, int size) {
-    return value >= kEdge_px && value <= static_cast<float>(size - 1) - kEdge_px;
+    return value >= kEdgePx && value <= static_cast<float>(size - 1) - kEdgePx;
   };
   if (!in(found.x(), image.width) || !in(found.y(), image.height)) return false;
   const auto ray = lens_.to_normalized(found.cast<double>());
@@ -263,7 +263,7 @@ bool Frontend::Impl::track_one(Track& track, const Transfer& motion, int level) 
 
 Flow Frontend::Impl::flow(std::size_t track) const {
   const Track& before = previous_[track];
-  const double sigma = stereo_ ? kDisparitySigma_px * stereo_->inverse_depth_per_pixel() : 0.0;
+  const double sigma = stereo_ ? kDisparitySigmaPx * stereo_->inverse_depth_per_pixel() : 0.0;
   return {before.left_ray, tracks_[track].left_ray, before.inverse_depth, sigma, before.has_depth};
 }
 

@@ -64,8 +64,7 @@ Lens::Lens(const CameraCalibration& camera)
     : model_(camera.lens),
       focal_(camera.fu, camera.fv),
       centre_(camera.cu, camera.cv),
-      k_(camera.distortion[0], camera.distortion[1], camera.distortion[2], camera.distortion[3]),
-      max_radius_(0.0) {
+      k_(camera.distortion[0], camera.distortion[1], camera.distortion[2], camera.distortion[3]) {
   if (camera.width <= 0 || camera.height <= 0) throw std::invalid_argument("camera: resolution must be positive");
   if (!focal_.allFinite() || focal_.minCoeff() <= 0.0) {
     throw std::invalid_argument("camera: focal lengths must be positive");

@@ -32,7 +32,8 @@ class Lens {
   Eigen::Vector2d focal_;
   Eigen::Vector2d centre_;
   Eigen::Vector4d k_;
-  double max_radius_;  // of a normalized point (radial-tangential) or angle [rad] (equidistant): the model folds beyond
+  double max_radius_ =
+      0.0;  // of a normalized point (radial-tangential) or angle [rad] (equidistant): the model folds beyond
 };
 
 }  // namespace ear

@@ -11,16 +11,16 @@ namespace {
 
 constexpr int kSearchLevel = 2;
 constexpr int kRefineLevel = 1;
-constexpr double kSearchStep_px = 4.0;         // on the base image: one pixel of the search level
+constexpr double kSearchStepPx = 4.0;          // on the base image: one pixel of the search level
 constexpr double kMaxDisparityShare = 0.2;     // of the image's width
 constexpr float kMinSearchCorrelation = 0.5F;  // on the search level
 constexpr float kRivalMargin = 0.1F;           // a second peak this close to the first is looked at as well
 constexpr float kAmbiguous = 0.03F;            // two places that differ less are not told apart
-constexpr double kMaxEpipolar_px = 2.5;        // calibrations are off by more than patches are
-constexpr double kMinDisparity_px = -0.7;      // noise of a point at infinity
-constexpr double kMaxDepthJump_px = 1.5;       // disparity against what was carried over, plus
+constexpr double kMaxEpipolarPx = 2.5;         // calibrations are off by more than patches are
+constexpr double kMinDisparityPx = -0.7;       // noise of a point at infinity
+constexpr double kMaxDepthJumpPx = 1.5;        // disparity against what was carried over, plus
 constexpr double kMaxDepthJumpShare = 0.1;     // this share of the disparity
-constexpr double kMapStep_px = 4.0;            // of the finite differences of an affine map
+constexpr double kMapStepPx = 4.0;             // of the finite differences of an affine map
 
 }  // namespace
 
@@ -48,11 +48,11 @@ Eigen::Matrix2f StereoMatcher::predicted_map(const Eigen::Vector2d& left_pixel, 
     return ray ? project(*ray, inverse_depth) : std::nullopt;
   };
   const auto centre = map(left_pixel);
-  const auto right = map(left_pixel + Eigen::Vector2d(kMapStep_px, 0.0));
-  const auto below = map(left_pixel + Eigen::Vector2d(0.0, kMapStep_px));
+  const auto right = map(left_pixel + Eigen::Vector2d(kMapStepPx, 0.0));
+  const auto below = map(left_pixel + Eigen::Vector2d(0.0, kMapStepPx));
   if (!centre || !right || !below) return Eigen::Matrix2f::Identity();
   Eigen::Matrix2d affine;
-  affine << (*right - *centre) / kMapStep_px, (*below - *centre) / kMapStep_px;
+  affine << (*right - *centre) / kMapStepPx, (*below - *centre) / kMapStepPx;
   return affine.cast<float>();
 }
 
@@ -62,8 +62,8 @@ std::optional<StereoMatch> StereoMatcher::accept(const ReferencePatch::Match& ma
   if (!right) return std::nullopt;
   const auto point = intersect(right_from_left_, left, *right);
   if (!point) return std::nullopt;
-  if (point->epipolar_distance * right_lens_.focal_px() > kMaxEpipolar_px) return std::nullopt;
-  if (point->inverse_depth < kMinDisparity_px * inverse_depth_per_pixel_) return std::nullopt;
+  if (point->epipolar_distance * right_lens_.focal_px() > kMaxEpipolarPx) return std::nullopt;
+  if (point->inverse_depth < kMinDisparityPx * inverse_depth_per_pixel_) return std::nullopt;
   return StereoMatch{*right, std::max(point->inverse_depth, 0.0), match.warp.affine * left_warp.affine.inverse()};
 }
 
@@ -77,7 +77,7 @@ std::optional<StereoMatch> StereoMatcher::follow(const ImagePyramid& right, cons
   const auto accepted = accept(*match, left_warp, left);
   if (!accepted) return std::nullopt;
   const double jump = std::abs(accepted->inverse_depth - inverse_depth);
-  if (jump > kMaxDepthJump_px * inverse_depth_per_pixel_ + kMaxDepthJumpShare * inverse_depth) return std::nullopt;
+  if (jump > kMaxDepthJumpPx * inverse_depth_per_pixel_ + kMaxDepthJumpShare * inverse_depth) return std::nullopt;
   return accepted;
 }
 
@@ -89,7 +89,7 @@ std::optional<StereoMatch> StereoMatcher::search(const ImagePyramid& right, cons
   const int level = std::min(kSearchLevel, right.top_level());
 
   std::vector<Hypothesis> line;
-  const double step = kSearchStep_px * inverse_depth_per_pixel_;
+  const double step = kSearchStepPx * inverse_depth_per_pixel_;
   for (double inverse_depth = 0.0; inverse_depth <= max_inverse_depth_; inverse_depth += step) {
     const auto pixel = project(left, inverse_depth);
     if (!pixel) continue;
