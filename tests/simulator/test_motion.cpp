@@ -15,11 +15,8 @@
 #include "tools/simulator/simulation.h"
 #include "tools/simulator/vehicle.h"
 
+namespace ear::simulator {
 namespace {
-
-using ear::seconds_between;
-using ear::TimeNs;
-using namespace ear::simulator;
 
 Options ideal(const std::string& sequence, std::uint64_t seed) {
   Options options;
@@ -90,7 +87,7 @@ Integrated integrate(const Simulation& simulation) {
 
 TEST_CASE("motion: noise-free IMU integrates back to the truth, < 1 cm in 60 s") {
   for (const std::string name : {"static", "flat1", "fly1", "sway1", "wave1"}) {
-    for (const std::uint64_t seed : {1, 2}) {
+    for (const std::uint64_t seed : {1U, 2U}) {
       if (name == "wave1" && seed > 1) continue;  // waves take longer to plan
       CAPTURE(name);
       CAPTURE(seed);
@@ -234,3 +231,5 @@ TEST_CASE("motion: lengths are those of the table") {
   CHECK(Simulation(ideal("fly1", 1)).path_length() == doctest::Approx(34.0).epsilon(0.03));
   CHECK(Simulation(ideal("static", 1)).path_length() < 1e-9);
 }
+
+}  // namespace ear::simulator

@@ -17,11 +17,10 @@
 #include "tools/simulator/recording_writer.h"
 #include "tools/simulator/simulation.h"
 
+namespace ear::simulator {
 namespace {
 
 namespace fs = std::filesystem;
-using namespace ear::simulator;
-
 // A folder of its own for each case, gone afterwards.
 class TemporaryFolder {
  public:
@@ -169,3 +168,5 @@ TEST_CASE("recording: pictures do not depend on the threads, and serve the other
   CHECK_THROWS_WITH_AS(require_same_pictures(other, folder / "nowhere"), doctest::Contains("simulation.yaml"),
                        std::runtime_error);
 }
+
+}  // namespace ear::simulator

@@ -18,9 +18,8 @@
 #include "tools/simulator/simulation.h"
 #include "tools/simulator/vehicle.h"
 
+namespace ear::simulator {
 namespace {
-
-using namespace ear::simulator;
 
 constexpr double kSquare = 0.12;  // [m] of the checkerboard
 constexpr int kSquares = 24;      // per edge
@@ -314,3 +313,5 @@ TEST_CASE("image sensor: exposure stays within its limits and changes slowly") {
     CHECK(largest - smallest > 0.1);
   }
 }
+
+}  // namespace ear::simulator

@@ -14,10 +14,8 @@
 #include "tools/simulator/vehicle.h"
 #include "tools/simulator/wheel_motion.h"
 
+namespace ear::simulator {
 namespace {
-
-using ear::TimeNs;
-using namespace ear::simulator;
 
 Options ideal(const std::string& sequence, std::uint64_t seed) {
   Options options;
@@ -351,3 +349,5 @@ TEST_CASE("simulation: what does not exist is said by name") {
   options.camera_rate_hz = 0.0;
   CHECK_THROWS_WITH_AS(Simulation{options}, doctest::Contains("camera rate"), std::invalid_argument);
 }
+
+}  // namespace ear::simulator

@@ -13,9 +13,8 @@
 #include "tools/simulator/simulation.h"
 #include "tools/simulator/vehicle.h"
 
+namespace ear::simulator {
 namespace {
-
-using namespace ear::simulator;
 
 Eigen::Isometry3d pose_WC(const Truth& truth, const ear::CameraCalibration& camera) {
   Eigen::Isometry3d T_WB = Eigen::Isometry3d::Identity();
@@ -24,15 +23,20 @@ Eigen::Isometry3d pose_WC(const Truth& truth, const ear::CameraCalibration& came
   return T_WB * camera.T_BC;
 }
 
+// All rays on which one feature was seen.
+struct Track {
+  std::vector<Eigen::Vector3d> origins, directions;
+};
+
 // The point nearest to all rays of a track: least squares over the perpendicular distances.
-Eigen::Vector3d intersect(const std::vector<Eigen::Vector3d>& origins, const std::vector<Eigen::Vector3d>& directions) {
+Eigen::Vector3d intersect(const Track& track) {
   Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
   Eigen::Vector3d b = Eigen::Vector3d::Zero();
-  for (std::size_t i = 0; i < origins.size(); ++i) {
-    const Eigen::Vector3d d = directions[i].normalized();
+  for (std::size_t i = 0; i < track.origins.size(); ++i) {
+    const Eigen::Vector3d d = track.directions[i].normalized();
     const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - d * d.transpose();
     A += across;
-    b += across * origins[i];
+    b += across * track.origins[i];
   }
   return A.ldlt().solve(b);
 }
@@ -84,24 +88,24 @@ TEST_CASE("tracks: rays of one id meet in one point, and the noise is what was a
   options.track.sigma_px = 0.0;
   const Simulation exact(options);
   double worst = 0.0;
-  std::map<std::uint64_t, std::pair<std::vector<Eigen::Vector3d>, std::vector<Eigen::Vector3d>>> rays;
+  std::map<std::uint64_t, Track> rays;
   for (std::size_t i = 0; i < exact.frame_times().size(); ++i) {
     const Truth truth = exact.truth(exact.frame_times()[i]);
     for (const ear::FeatureObservation& seen : exact.tracks(i).features) {
       for (std::size_t camera = 0; camera < (seen.has_right ? 2U : 1U); ++camera) {
         const Eigen::Isometry3d T_WC = pose_WC(truth, cameras[camera]);
         const Eigen::Vector2d ray = camera == 0 ? seen.left : seen.right;
-        rays[seen.id].first.push_back(T_WC.translation());
-        rays[seen.id].second.push_back((T_WC.linear() * ray.homogeneous()).normalized());
+        rays[seen.id].origins.emplace_back(T_WC.translation());
+        rays[seen.id].directions.emplace_back((T_WC.linear() * ray.homogeneous()).normalized());
       }
     }
   }
   for (const auto& [id, track] : rays) {
-    if (track.first.size() < 4) continue;
-    const Eigen::Vector3d p_W = intersect(track.first, track.second);
-    for (std::size_t i = 0; i < track.first.size(); ++i) {
-      const Eigen::Vector3d along = p_W - track.first[i];
-      worst = std::max(worst, track.second[i].cross(along).norm() / along.norm());
+    if (track.origins.size() < 4) continue;
+    const Eigen::Vector3d p_W = intersect(track);
+    for (std::size_t i = 0; i < track.origins.size(); ++i) {
+      const Eigen::Vector3d along = p_W - track.origins[i];
+      worst = std::max(worst, track.directions[i].cross(along).norm() / along.norm());
     }
   }
   CHECK(worst < 1e-6);
@@ -195,3 +199,5 @@ TEST_CASE("tracks: no feature lies behind furniture") {
   CHECK(hit->range == doctest::Approx(6.0 - 2.6));
   CHECK(scene.panels[static_cast<std::size_t>(hit->panel)].material == Material::concrete);
 }
+
+}  // namespace ear::simulator

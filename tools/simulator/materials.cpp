@@ -69,6 +69,7 @@ class Canvas {
   }
   void polygon(const std::vector<Eigen::Vector2d>& corners, double grey) {
     std::vector<cv::Point> points;
+    points.reserve(corners.size());
     for (const Eigen::Vector2d& corner : corners) points.push_back(point(corner.x(), corner.y()));
     cv::fillPoly(image_, std::vector<std::vector<cv::Point>>{points}, cv::Scalar(grey), cv::LINE_AA, kShift);
   }

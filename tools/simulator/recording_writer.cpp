@@ -10,6 +10,7 @@
 #include <memory>
 #include <mutex>
 #include <opencv2/imgcodecs.hpp>
+#include <sstream>
 #include <stdexcept>
 #include <thread>
 #include <vector>
@@ -56,7 +57,7 @@ class TextFile {
 long long number(TimeNs t_ns) { return static_cast<long long>(t_ns); }
 
 void print_pose(TextFile& file, const Eigen::Isometry3d& T_BS) {
-  const Eigen::Matrix4d m = T_BS.matrix();
+  const Eigen::Matrix4d& m = T_BS.matrix();
   file.print("T_BS:\n  rows: 4\n  cols: 4\n  data: [");
   for (Eigen::Index row = 0; row < 4; ++row) {
     for (Eigen::Index column = 0; column < 4; ++column) {
@@ -278,8 +279,9 @@ void require_same_pictures(const Simulation& simulation, const fs::path& other) 
   for (const std::string& expected : picture_origin(simulation)) {
     std::getline(file, line);
     if (line != expected) {
-      throw std::runtime_error(origin.string() + ": says '" + line + "', the pictures needed are of '" + expected +
-                               "'");
+      std::ostringstream message;
+      message << origin.string() << ": says '" << line << "', the pictures needed are of '" << expected << "'";
+      throw std::runtime_error(message.str());
     }
   }
 }

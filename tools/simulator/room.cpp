@@ -110,6 +110,7 @@ Scene make_room(const Terrain& terrain) {
 
 std::vector<Eigen::Vector4d> room_footprints() {
   std::vector<Eigen::Vector4d> footprints;
+  footprints.reserve(kBlocks.size());
   for (const Block& block : kBlocks) footprints.emplace_back(block.min_x, block.min_y, block.max_x, block.max_y);
   return footprints;
 }

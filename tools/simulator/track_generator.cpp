@@ -59,8 +59,10 @@ void replenish(std::vector<Landmark>& landmarks, std::uint64_t& next_id, const S
   std::shuffle(empty.begin(), empty.end(), rng);
   for (const std::size_t cell : empty) {
     if (landmarks.size() >= static_cast<std::size_t>(max_features)) return;
-    const double u = kCell * (static_cast<double>(cell % static_cast<std::size_t>(columns)) + uniform(rng, 0.0, 1.0));
-    const double v = kCell * (static_cast<double>(cell / static_cast<std::size_t>(columns)) + uniform(rng, 0.0, 1.0));
+    const std::size_t column = cell % static_cast<std::size_t>(columns);
+    const std::size_t row = cell / static_cast<std::size_t>(columns);
+    const double u = kCell * (static_cast<double>(column) + uniform(rng, 0.0, 1.0));
+    const double v = kCell * (static_cast<double>(row) + uniform(rng, 0.0, 1.0));
     const Eigen::Vector3d direction_W = T_WC.linear() * to_ray(camera, {u, v}).homogeneous().normalized();
     const auto hit = scene.cast(T_WC.translation(), direction_W);
     if (!hit || hit->range > kFarthest) continue;
