@@ -19,15 +19,37 @@ bool StandstillDetector::update(const FeatureFrame& frame, const ImuStatistics& 
     return false;
   }
   standing_ = seconds_between(since_ns_, frame.t_ns) >= config_.duration;
+  if (standing_) renew_reference(frame);
   return standing_;
+}
+
+/// Features end also at rest. Those that are new take the place of the old ones, where they are seen now.
+void StandstillDetector::renew_reference(const FeatureFrame& frame) {
+  renewed_.clear();
+  for (const FeatureObservation& feature : frame.features) {
+    const FeatureObservation* const known = find_in_reference(feature.id);
+    renewed_.push_back(known == nullptr ? feature : *known);
+  }
+  reference_.swap(renewed_);
+  sort_reference();
+}
+
+const FeatureObservation* StandstillDetector::find_in_reference(std::uint64_t id) const {
+  const auto match = std::lower_bound(reference_.begin(), reference_.end(), id,
+                                      [](const FeatureObservation& o, std::uint64_t wanted) { return o.id < wanted; });
+  return match == reference_.end() || match->id != id ? nullptr : &*match;
+}
+
+void StandstillDetector::sort_reference() {
+  std::sort(reference_.begin(), reference_.end(),
+            [](const FeatureObservation& a, const FeatureObservation& b) { return a.id < b.id; });
 }
 
 void StandstillDetector::restart(const FeatureFrame& frame) {
   standing_ = false;
   since_ns_ = frame.t_ns;
   reference_ = frame.features;
-  std::sort(reference_.begin(), reference_.end(),
-            [](const FeatureObservation& a, const FeatureObservation& b) { return a.id < b.id; });
+  sort_reference();
 }
 
 /// A shift, an expansion and a turn of the image each move the median of one component, which noise of single features
@@ -35,9 +57,8 @@ void StandstillDetector::restart(const FeatureFrame& frame) {
 double StandstillDetector::common_flow_px(const FeatureFrame& frame) {
   for (auto& component : flow_) component.clear();
   for (const FeatureObservation& feature : frame.features) {
-    const auto match = std::lower_bound(reference_.begin(), reference_.end(), feature.id,
-                                        [](const FeatureObservation& o, std::uint64_t id) { return o.id < id; });
-    if (match == reference_.end() || match->id != feature.id) continue;
+    const FeatureObservation* const match = find_in_reference(feature.id);
+    if (match == nullptr) continue;
     const Eigen::Vector2d flow = focal_px_ * (feature.left - match->left);
     const Eigen::Vector2d outward = match->left.stableNormalized();
     flow_[0].push_back(flow.x());

@@ -24,13 +24,17 @@ class StandstillDetector {
   static constexpr TimeNs kMoving = -1;
 
   void restart(const FeatureFrame& frame);
+  void renew_reference(const FeatureFrame& frame);
+  void sort_reference();
+  [[nodiscard]] const FeatureObservation* find_in_reference(std::uint64_t id) const;
   [[nodiscard]] double common_flow_px(const FeatureFrame& frame);
 
   StandstillConfig config_;
   double focal_px_;
   bool standing_ = false;
   TimeNs since_ns_ = kMoving;                  ///< first frame of the present stillness
-  std::vector<FeatureObservation> reference_;  ///< features of that frame, by ascending id
+  std::vector<FeatureObservation> reference_;  ///< features where they were then, by ascending id
+  std::vector<FeatureObservation> renewed_;
   std::array<std::vector<double>, 4> flow_;
 };
 

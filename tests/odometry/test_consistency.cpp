@@ -8,6 +8,7 @@
 
 #include "filter/chi_squared.h"
 #include "filter/filter.h"
+#include "tests/support/simulated_run.h"
 #include "tools/simulator/simulation.h"
 
 using namespace ear;
@@ -22,19 +23,6 @@ constexpr std::uint64_t kFirstSeed = 7001;  // not used in development
 
 struct Nees {
   std::vector<double> position, orientation;  // per frame
-};
-
-/// The truth seen from the estimator's world, whose origin and yaw are the first pose.
-struct WorldAlignment {
-  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
-  Eigen::Vector3d p = Eigen::Vector3d::Zero();
-
-  WorldAlignment(const NavState& first, const simulator::Truth& truth) {
-    const Eigen::Matrix3d D = first.q_WB.toRotationMatrix() * truth.R_WB.transpose();
-    R = Eigen::AngleAxisd(std::atan2(D(1, 0) - D(0, 1), D(0, 0) + D(1, 1)), Eigen::Vector3d::UnitZ())
-            .toRotationMatrix();
-    p = first.p_WB - R * truth.p_WB;
-  }
 };
 
 Nees run(const char* sequence, std::uint64_t seed, bool calibrate) {
@@ -58,25 +46,13 @@ Nees run(const char* sequence, std::uint64_t seed, bool calibrate) {
   Filter filter(config, simulation.calibration());
 
   Nees nees;
-  std::optional<WorldAlignment> world;
-  std::size_t next_imu = 0;
-  const TimeNs start = simulation.frame_times().front();
-  for (std::size_t i = 0; i < simulation.frame_times().size(); ++i) {
-    const TimeNs t_ns = simulation.frame_times()[i];
-    while (next_imu < simulation.imu().size() && simulation.imu()[next_imu].t_ns < t_ns + 10'000'000) {
-      filter.add_imu(simulation.imu()[next_imu++]);
-    }
-    const std::optional<Estimate> estimate = filter.process(simulation.tracks(i));
-    if (!estimate) continue;
-    const simulator::Truth truth = simulation.truth(estimate->state.t_ns);
-    if (!world) world.emplace(estimate->state, truth);
-    if (seconds_between(start, t_ns) < kMoving) continue;
-    const Eigen::Vector3d dp = world->R * truth.p_WB + world->p - estimate->state.p_WB;
-    const Eigen::Vector3d dtheta = log_so3(world->R * truth.R_WB * estimate->state.q_WB.toRotationMatrix().transpose());
-    const Eigen::Matrix3d P_p = estimate->covariance.block<3, 3>(estimate_error::position, estimate_error::position);
-    const Eigen::Matrix3d P_R = estimate->covariance.block<3, 3>(estimate_error::rotation, estimate_error::rotation);
-    nees.position.push_back(dp.dot(P_p.ldlt().solve(dp)));
-    nees.orientation.push_back(dtheta.dot(P_R.ldlt().solve(dtheta)));
+  for (const test::EvaluatedEstimate& e : test::run_filter(filter, simulation)) {
+    if (e.t < kMoving) continue;
+    const auto& P = e.estimate.covariance;
+    const Eigen::Matrix3d P_p = P.block<3, 3>(estimate_error::position, estimate_error::position);
+    const Eigen::Matrix3d P_R = P.block<3, 3>(estimate_error::rotation, estimate_error::rotation);
+    nees.position.push_back(e.dp_W.dot(P_p.ldlt().solve(e.dp_W)));
+    nees.orientation.push_back(e.dtheta_W.dot(P_R.ldlt().solve(e.dtheta_W)));
   }
   return nees;
 }

@@ -1,0 +1,242 @@
+// The filter as a whole, on simulated feature tracks: starting, standing, moving, and input that is wrong.
+#include <doctest/doctest.h>
+
+#include <Eigen/Eigenvalues>
+#include <limits>
+
+#include "filter/filter.h"
+#include "tests/support/simulated_run.h"
+#include "tools/simulator/simulation.h"
+
+using namespace ear;
+using namespace ear::test;
+
+namespace {
+
+simulator::Simulation simulate(const char* sequence, double duration, bool perfect = true) {
+  simulator::Options options;
+  options.sequence = sequence;
+  options.seed = 8101;
+  options.duration = duration;
+  options.perfect_calibration = perfect;
+  return simulator::Simulation(options);
+}
+
+double largest_error(const std::vector<EvaluatedEstimate>& run) {
+  double largest = 0.0;
+  for (const EvaluatedEstimate& e : run) largest = std::max(largest, e.dp_W.norm());
+  return largest;
+}
+
+/// The same motion seen by somebody who switches on only after `start` seconds.
+std::size_t estimates_when_started_at(const simulator::Simulation& simulation, double start, double end) {
+  Filter filter(FilterConfig{}, simulation.calibration());
+  const TimeNs first = simulation.frame_times().front();
+  std::size_t estimates = 0;
+  std::size_t next_imu = 0;
+  for (std::size_t i = 0; i < simulation.frame_times().size(); ++i) {
+    const TimeNs t_ns = simulation.frame_times()[i];
+    const double t = seconds_between(first, t_ns);
+    for (; next_imu < simulation.imu().size() && simulation.imu()[next_imu].t_ns < t_ns + 10'000'000; ++next_imu) {
+      if (t >= start) filter.add_imu(simulation.imu()[next_imu]);
+    }
+    if (t >= start && t < end && filter.process(simulation.tracks(i))) ++estimates;
+  }
+  CHECK(filter.status() == (estimates > 0 ? Status::tracking : Status::waiting_for_standstill));
+  return estimates;
+}
+
+}  // namespace
+
+TEST_CASE("filter: starts within a second of standing, level and at the origin") {
+  const simulator::Simulation simulation = simulate("flat1", 2.0);
+  Filter filter(FilterConfig{}, simulation.calibration());
+  const auto run = run_filter(filter, simulation);
+  REQUIRE(!run.empty());
+  CHECK(run.front().t < 1.0);
+  CHECK(run.front().estimate.state.p_WB.norm() < 1e-3);
+  CHECK(run.front().dtheta_W.norm() < 0.02);  // an accelerometer bias of 0.1 m/s^2 tilts by 0.01 rad
+}
+
+TEST_CASE("filter: a vehicle that moves gets no pose") {
+  const simulator::Simulation simulation = simulate("flat1", 9.0);
+  CHECK(estimates_when_started_at(simulation, 0.0, 9.0) > 200);
+  CHECK(estimates_when_started_at(simulation, 5.0, 9.0) == 0);
+}
+
+TEST_CASE("filter: standing for a minute it stays where it is") {
+  const simulator::Simulation simulation = simulate("static", 60.0);
+  Filter filter(FilterConfig{}, simulation.calibration());
+  const auto run = run_filter(filter, simulation);
+  REQUIRE(run.size() > 1700);
+  CHECK(run.back().dp_W.norm() < 0.005);
+  CHECK(std::abs(run.back().dtheta_W.z()) < 0.1 * M_PI / 180.0);
+  CHECK(run.back().estimate.frame.standing);
+  CHECK(run.back().estimate.frame.clones <= 1);  // standing fills no window with copies
+}
+
+TEST_CASE("filter: follows a drive, with both cameras and with one") {
+  const simulator::Simulation simulation = simulate("flat1", 25.0);
+  Filter stereo(FilterConfig{}, simulation.calibration());
+  CHECK(largest_error(run_filter(stereo, simulation)) < 0.05);
+  Filter mono(FilterConfig{}, simulation.calibration());
+  const auto without_right = [](FeatureFrame& frame) {
+    for (FeatureObservation& feature : frame.features) feature.has_right = false;
+  };
+  CHECK(largest_error(run_filter(mono, simulation, without_right)) < 0.5);
+}
+
+TEST_CASE("filter: learns the calibration, and leaves it alone where it is frozen") {
+  const simulator::Simulation simulation = simulate("flat1", 30.0, false);
+  const Eigen::Isometry3d T_true = simulation.true_calibration().cameras[0].T_BC;
+  const Eigen::Isometry3d T_told = simulation.calibration().cameras[0].T_BC;
+  const double offset_true = simulation.true_calibration().camera_time_offset;
+  const auto angle_to_truth = [&](const Eigen::Matrix3d& R) { return log_so3(R * T_true.linear().transpose()).norm(); };
+
+  Filter learning(FilterConfig{}, simulation.calibration());
+  run_filter(learning, simulation);
+  CHECK(angle_to_truth(learning.state().camera.T_BC0.R) < 0.5 * angle_to_truth(T_told.linear()));
+  CHECK(std::abs(learning.state().camera.time_offset - offset_true) < 0.5e-3);
+
+  FilterConfig frozen_config;
+  frozen_config.online_calibration.camera_extrinsics = false;
+  frozen_config.online_calibration.time_offset = false;
+  Filter frozen(frozen_config, simulation.calibration());
+  run_filter(frozen, simulation);
+  CHECK((frozen.state().camera.T_BC0.R - T_told.linear()).norm() < 1e-9);
+  CHECK(frozen.state().camera.time_offset == simulation.calibration().camera_time_offset);
+}
+
+TEST_CASE("filter: turning on the spot does not push the translation out of the window") {
+  // All frames at one place, turning: whatever their number, the clones before the turn are still there.
+  const simulator::Simulation simulation = simulate("flat1", 12.0);
+  Filter filter(FilterConfig{}, simulation.calibration());
+  run_filter(filter, simulation);
+  const std::vector<Clone> before = filter.state().clones;
+  FeatureFrame frame = simulation.tracks(simulation.frame_times().size() - 1);
+  ImuSample sample = simulation.imu().back();
+  for (int i = 0; i < 40; ++i) {  // 1.3 s at 0.5 rad/s to the left
+    for (int k = 0; k < 7; ++k) {
+      sample.t_ns += 4'714'286;
+      sample.gyro_B = filter.state().imu.b_g + Eigen::Vector3d(0.0, 0.0, 0.5);
+      sample.accel_B = filter.state().imu.R_WB.transpose() * -kGravity_W + filter.state().imu.b_a;
+      filter.add_imu(sample);
+    }
+    frame.t_ns += 33'000'000;
+    const Eigen::Matrix3d R_BC = simulation.calibration().cameras[0].T_BC.linear();
+    const Eigen::Matrix3d R_C1C0 = R_BC.transpose() * exp_so3({0.0, 0.0, -0.5 * 0.033}) * R_BC;
+    for (FeatureObservation& feature : frame.features) {
+      feature.left = Eigen::Vector3d(R_C1C0 * feature.left.homogeneous()).hnormalized();
+      feature.has_right = false;
+    }
+    REQUIRE(filter.process(frame));
+  }
+  const auto kept = [&](std::uint64_t number) {
+    for (const Clone& clone : filter.state().clones) {
+      if (clone.frame == number) return true;
+    }
+    return false;
+  };
+  CHECK(kept(before.front().frame));
+  CHECK(kept(before[before.size() / 2].frame));
+}
+
+TEST_CASE("filter: the same input gives the same bits") {
+  const simulator::Simulation simulation = simulate("fly1", 8.0, false);
+  Filter a(FilterConfig{}, simulation.calibration());
+  Filter b(FilterConfig{}, simulation.calibration());
+  const auto run_a = run_filter(a, simulation);
+  const auto run_b = run_filter(b, simulation);
+  REQUIRE(run_a.size() == run_b.size());
+  CHECK(run_a.back().estimate.state.p_WB == run_b.back().estimate.state.p_WB);
+  CHECK(run_a.back().estimate.covariance == run_b.back().estimate.covariance);
+}
+
+TEST_CASE("filter: predict carries the state on at the IMU's rate") {
+  const simulator::Simulation simulation = simulate("flat1", 10.0);
+  Filter filter(FilterConfig{}, simulation.calibration());
+  CHECK_FALSE(filter.predict(0));
+  const auto run = run_filter(filter, simulation);
+  const NavState& last = run.back().estimate.state;
+  const std::optional<NavState> same = filter.predict(last.t_ns);
+  const std::optional<NavState> later = filter.predict(last.t_ns + 5'000'000);
+  REQUIRE(same);
+  REQUIRE(later);
+  CHECK((same->p_WB - last.p_WB).norm() == 0.0);
+  CHECK(later->t_ns == last.t_ns + 5'000'000);
+  CHECK((later->p_WB - last.p_WB - 0.005 * last.v_W).norm() < 1e-4);
+}
+
+TEST_CASE("filter: samples that are not numbers, late or twice are refused and counted") {
+  const simulator::Simulation simulation = simulate("flat1", 1.0);
+  Filter filter(FilterConfig{}, simulation.calibration());
+  ImuSample sample = simulation.imu().front();
+  filter.add_imu(sample);
+  filter.add_imu(sample);  // twice
+  sample.t_ns -= 1;
+  filter.add_imu(sample);  // late
+  sample.t_ns += 10'000'000;
+  sample.gyro_B.x() = std::numeric_limits<double>::quiet_NaN();
+  filter.add_imu(sample);
+  sample.gyro_B.x() = 0.0;
+  sample.accel_B.z() = std::numeric_limits<double>::infinity();
+  filter.add_imu(sample);
+  CHECK(filter.imu_counts().rejected == 4);
+  CHECK(filter.imu_counts().gaps == 0);
+}
+
+TEST_CASE("filter: wild observations do no harm") {
+  const simulator::Simulation simulation = simulate("flat1", 20.0);
+  Filter filter(FilterConfig{}, simulation.calibration());
+  std::size_t frames = 0;
+  const auto wild = [&](FeatureFrame& frame) {
+    ++frames;
+    for (FeatureObservation& feature : frame.features) {
+      if ((feature.id + frames) % 40 == 0) feature.left.x() += 0.1;  // 40 px off, now and then
+      if (feature.id % 50 == 1) feature.left.y() = std::numeric_limits<double>::quiet_NaN();
+    }
+  };
+  const auto run = run_filter(filter, simulation, wild);
+  REQUIRE(run.size() > 500);
+  CHECK(largest_error(run) < 0.1);
+  for (const EvaluatedEstimate& e : run) {
+    REQUIRE(e.estimate.state.p_WB.allFinite());
+    REQUIRE(e.estimate.covariance.allFinite());
+  }
+  using Solver = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>;
+  CHECK(Solver(filter.covariance().matrix()).eigenvalues().minCoeff() > -1e-9);
+}
+
+TEST_CASE("filter: a hole in the inertial data is counted and survived") {
+  const simulator::Simulation simulation = simulate("flat1", 15.0);
+  Filter filter(FilterConfig{}, simulation.calibration());
+  const TimeNs start = simulation.imu().front().t_ns;
+  std::size_t next_imu = 0;
+  std::optional<Estimate> estimate;
+  for (std::size_t i = 0; i < simulation.frame_times().size(); ++i) {
+    for (; next_imu < simulation.imu().size() &&
+           simulation.imu()[next_imu].t_ns < simulation.frame_times()[i] + 10'000'000;
+         ++next_imu) {
+      const double t = seconds_between(start, simulation.imu()[next_imu].t_ns);
+      if (t < 8.0 || t > 8.2) filter.add_imu(simulation.imu()[next_imu]);
+    }
+    estimate = filter.process(simulation.tracks(i));
+  }
+  CHECK(filter.imu_counts().gaps == 1);
+  REQUIRE(estimate);
+  const simulator::Truth truth = simulation.truth(estimate->state.t_ns);
+  CHECK((estimate->state.v_W.norm() - truth.v_W.norm()) < 0.1);
+}
+
+TEST_CASE("filter: settings and calibrations that cannot be are refused by name") {
+  const simulator::Simulation simulation = simulate("flat1", 0.5);
+  FilterConfig config;
+  config.window = 1;
+  CHECK_THROWS_WITH_AS(Filter(config, simulation.calibration()), "filter.window: at least 3 clones are needed",
+                       std::invalid_argument);
+  Calibration calibration = simulation.calibration();
+  calibration.cameras[0].T_BC.linear() *= 1.1;
+  CHECK_THROWS_AS(Filter(FilterConfig{}, calibration), std::invalid_argument);
+  calibration.cameras.clear();
+  CHECK_THROWS_AS(Filter(FilterConfig{}, calibration), std::invalid_argument);
+}

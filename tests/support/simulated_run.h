@@ -1,0 +1,61 @@
+// A filter run over simulated feature tracks, and how far it is from the truth.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "filter/filter.h"
+#include "tools/simulator/simulation.h"
+
+namespace ear::test {
+
+/// Turns and shifts the truth into the estimator's world, whose origin and yaw are the first pose.
+struct WorldAlignment {
+  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d p = Eigen::Vector3d::Zero();
+
+  WorldAlignment(const NavState& first, const simulator::Truth& truth) {
+    const Eigen::Matrix3d D = first.q_WB.toRotationMatrix() * truth.R_WB.transpose();
+    R = Eigen::AngleAxisd(std::atan2(D(1, 0) - D(0, 1), D(0, 0) + D(1, 1)), Eigen::Vector3d::UnitZ())
+            .toRotationMatrix();
+    p = first.p_WB - R * truth.p_WB;
+  }
+};
+
+/// One estimate and its errors, true minus estimated.
+struct EvaluatedEstimate {
+  double t = 0.0;  ///< [s] since the first frame
+  Estimate estimate;
+  Eigen::Vector3d dp_W;      ///< [m]
+  Eigen::Vector3d dtheta_W;  ///< [rad]
+};
+
+/// Feeds inertial samples and tracks to the filter; `change` may alter a frame's features before they go in.
+inline std::vector<EvaluatedEstimate> run_filter(
+    Filter& filter, const simulator::Simulation& simulation,
+    const std::function<void(FeatureFrame&)>& change = [](FeatureFrame&) {}) {
+  std::vector<EvaluatedEstimate> result;
+  std::optional<WorldAlignment> world;
+  std::size_t next_imu = 0;
+  const std::vector<TimeNs>& times = simulation.frame_times();
+  for (std::size_t i = 0; i < times.size(); ++i) {
+    while (next_imu < simulation.imu().size() && simulation.imu()[next_imu].t_ns < times[i] + 10'000'000) {
+      filter.add_imu(simulation.imu()[next_imu++]);
+    }
+    FeatureFrame frame = simulation.tracks(i);
+    change(frame);
+    const std::optional<Estimate> estimate = filter.process(frame);
+    if (!estimate) continue;
+    const NavState& x = estimate->state;
+    const simulator::Truth truth = simulation.truth(x.t_ns);
+    if (!world) world.emplace(x, truth);
+    result.push_back({seconds_between(times.front(), times[i]), *estimate, world->R * truth.p_WB + world->p - x.p_WB,
+                      log_so3(world->R * truth.R_WB * x.q_WB.toRotationMatrix().transpose())});
+  }
+  return result;
+}
+
+}  // namespace ear::test
