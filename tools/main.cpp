@@ -5,7 +5,9 @@
 
 #include "tools/commands.h"
 
-int main(int argc, char** argv) {
+namespace {
+
+int run_subcommand(int argc, char** argv) {
   CLI::App app{"ear: where a vehicle that drives and flies is, from cameras, IMU, wheels and lasers"};
   app.require_subcommand(1);
   ear::tools::add_run_command(app);
@@ -15,11 +17,19 @@ int main(int argc, char** argv) {
   ear::tools::add_bench_command(app);
   try {
     app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
+  } catch (const CLI::ParseError& error) {  // also --help
     return app.exit(error);
+  }
+  return EXIT_SUCCESS;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return run_subcommand(argc, argv);
   } catch (const std::exception& error) {
     std::cerr << "ear: " << error.what() << '\n';
     return EXIT_FAILURE;
   }
-  return EXIT_SUCCESS;
 }

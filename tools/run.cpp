@@ -1,6 +1,7 @@
 // ear run RECORDING: replays a recording through the estimator; writes the trajectory and what explains it.
 #include <opencv2/core/utility.hpp>
 
+#include <array>
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
@@ -67,18 +68,19 @@ const char* status_text(Status status) {
 std::string progress_line(const ReplayedFrame& frame, const Odometry& odometry, const TimeSpan& span,
                           double wall_time) {
   const double done = seconds_between(span.first_ns, frame.t_ns);
-  char line[200];
-  int length = std::snprintf(line, sizeof line, "%3.0f %%  %5.1f x real time  ",
-                             100.0 * done / seconds_between(span.first_ns, span.last_ns), done / wall_time);
-  const auto rest = sizeof line - static_cast<std::size_t>(length);
+  std::array<char, 200> line{};
+  const int length = std::snprintf(line.data(), line.size(), "%3.0f %%  %5.1f x real time  ",
+                                   100.0 * done / seconds_between(span.first_ns, span.last_ns), done / wall_time);
+  char* const end = line.data() + length;
+  const std::size_t rest = line.size() - static_cast<std::size_t>(length);
   if (frame.estimate) {
     const Eigen::Vector3d& p = frame.estimate->state.p_WB;
-    std::snprintf(line + length, rest, "position %7.2f %7.2f %6.2f m  tracks %3d  %s", p.x(), p.y(), p.z(),
+    std::snprintf(end, rest, "position %7.2f %7.2f %6.2f m  tracks %3d  %s", p.x(), p.y(), p.z(),
                   frame.estimate->frame.tracks, frame.estimate->frame.standing ? "standing" : "moving");
   } else {
-    std::snprintf(line + length, rest, "%s", status_text(odometry.status()));
+    std::snprintf(end, rest, "%s", status_text(odometry.status()));
   }
-  return line;
+  return line.data();
 }
 
 RunSummary summarize(const RunArguments& args, const Recording& recording, const Odometry& odometry,
