@@ -244,7 +244,7 @@ void Filter::append_clone() {
   J_offset << rate_W, x.v_W + x.p_WB.cross(rate_W);
   covariance_.append_clone(J_imu, J_offset);
   state_.clones.push_back({next_frame_++, {x.R_WB, x.p_WB}});
-  learn_calibration_ = rate_B_.norm() > config_.online_calibration.min_rate;
+  learn_calibration_ = true;
 }
 
 void Filter::update_with_features(const FeatureFrame& frame) {

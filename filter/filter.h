@@ -90,7 +90,7 @@ class Filter {
   std::uint64_t next_frame_ = 0;
   TimeNs last_frame_ns_ = 0;  ///< camera stamp of the last frame processed
   bool any_frame_ = false;
-  bool learn_calibration_ = false;  ///< the motion tells something about it
+  bool learn_calibration_ = false;  ///< standing tells nothing about it
   FrameStatistics statistics_;
 
   FeatureInformation information_;

@@ -32,7 +32,6 @@ struct PriorConfig {
 struct OnlineCalibrationConfig {
   bool camera_extrinsics = true;  ///< pose of camera 0 in the body, and of camera 1 in camera 0
   bool time_offset = true;        ///< camera against IMU
-  double min_rate = 0.1;  ///< [rad/s] below this turn rate nothing is learned: the quantities are only considered
 };
 
 struct FilterConfig {

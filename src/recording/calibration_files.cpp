@@ -157,6 +157,10 @@ void read_cameras(const fs::path& mav0, Calibration& calibration) {
   for (const char* name : {"cam0", "cam1"}) {
     if (has_sensor(mav0, name)) calibration.cameras.push_back(read_camera(mav0 / name / "sensor.yaml"));
   }
+  if (has_sensor(mav0, "cam0")) {  // an optional key beyond EuRoC's, under Kalibr's name
+    calibration.camera_time_offset =
+        YamlMap::load(mav0 / "cam0" / "sensor.yaml").get_or("timeshift_cam_imu", 0.0);
+  }
 }
 
 // Reads imu0/sensor.yaml and returns its T_BS: IMU to the body of the files.

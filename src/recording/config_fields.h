@@ -49,7 +49,6 @@ template <typename C, typename F>
 EnableFor<C, OnlineCalibrationConfig> visit(C& c, F&& f) {
   f("camera_extrinsics", c.camera_extrinsics);
   f("time_offset", c.time_offset);
-  f("min_rate", c.min_rate);
 }
 
 template <typename C, typename F>

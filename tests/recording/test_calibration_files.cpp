@@ -92,6 +92,15 @@ TEST_CASE("calibration: all keys of sensor.yaml") {
   CHECK(check_calibration(c).empty());
 }
 
+TEST_CASE("calibration: the time offset may stand in cam0's sensor.yaml") {
+  const TempFolder folder;
+  write_full_recording(folder.path());
+  CHECK(load(folder.path()).camera_time_offset == 0.0);
+  const fs::path file = folder.path() / "cam0" / "sensor.yaml";
+  write_text(file, read_text(file) + "\ntimeshift_cam_imu: 0.0015\n");
+  CHECK(load(folder.path()).camera_time_offset == 0.0015);
+}
+
 TEST_CASE("calibration: names of lens models") {
   const TempFolder folder;
   write_full_recording(folder.path());
