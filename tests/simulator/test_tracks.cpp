@@ -200,4 +200,70 @@ TEST_CASE("tracks: no feature lies behind furniture") {
   CHECK(scene.panels[static_cast<std::size_t>(hit->panel)].material == Material::concrete);
 }
 
+TEST_CASE("tracks: nothing is seen once the lenses are covered") {
+  Options options;
+  options.sequence = "occlusion1";
+  options.seed = 24;
+  options.duration = 6.0;
+  const Simulation simulation(options);
+  for (std::size_t i = 0; i < simulation.frame_times().size(); ++i) {
+    const double t = static_cast<double>(simulation.frame_times()[i] - simulation.frame_times()[0]) * 1e-9;
+    if (t < 2.0) CHECK(simulation.tracks(i).features.size() == 150);
+    if (t > 2.5) CHECK(simulation.tracks(i).features.empty());
+  }
+}
+
+TEST_CASE("tracks: outdoors there are enough, few of them near; blades of grass end some") {
+  Options options;
+  options.sequence = "lawn";
+  options.seed = 25;
+  options.duration = 12.0;
+  const Simulation simulation(options);
+  const Obstruction& obstruction = simulation.obstruction();
+  double passing = 0.0;
+  double hidden = 0.0;
+  for (std::size_t i = 0; i < simulation.frame_times().size(); ++i) {
+    const ear::FeatureFrame& frame = simulation.tracks(i);
+    CHECK(frame.features.size() > 60);
+    const double t = static_cast<double>(frame.t_ns - 1'600'000'000'000'000'000) * 1e-9;
+    if (!obstruction.active(t)) continue;
+    passing += 1.0;
+    for (const ear::FeatureObservation& seen : frame.features) {
+      // Half of the noise of 0.5 px may put a track next to a blade on it.
+      hidden += obstruction.veil(0, t, seen.left).opacity > 0.8 ? 1.0 : 0.0;
+    }
+  }
+  CHECK(passing > 10.0);
+  CHECK(hidden / passing < 1.0);
+}
+
+TEST_CASE("obstruction: a blade is where it is in both pictures, and passes") {
+  Hindrance hindrance;
+  hindrance.tufts = 0.5;
+  Rng rng = make_rng(3, Stream::obstruction);
+  const Obstruction grass(hindrance, 60.0, rng);
+  double frames = 0.0;
+  double passing = 0.0;
+  double veiled = 0.0;
+  double rays = 0.0;
+  for (double t = 0.0; t < 60.0; t += 0.1) {
+    frames += 1.0;
+    if (!grass.active(t)) {
+      CHECK(grass.veil(0, t, {0.1, 0.3}).opacity == 0.0);
+      continue;
+    }
+    passing += 1.0;
+    for (double x = -0.8; x < 0.8; x += 0.05) {
+      for (double y = -0.6; y < 0.6; y += 0.1) {
+        rays += 1.0;
+        veiled += grass.veil(0, t, {x, y}).opacity > 0.5 ? 1.0 : 0.0;
+      }
+    }
+  }
+  CHECK(passing / frames > 0.1);
+  CHECK(passing / frames < 0.4);
+  CHECK(veiled / rays > 0.02);
+  CHECK(veiled / rays < 0.4);
+}
+
 }  // namespace ear::simulator

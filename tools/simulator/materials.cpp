@@ -345,6 +345,72 @@ void paint_metal(Canvas& canvas) {
   scuffs(canvas, 25.0, 0.1, 40.0);
 }
 
+// Blades in all directions over darker earth, with bare and mown places.
+void paint_grass(Canvas& canvas) {
+  canvas.fill(88.0);
+  canvas.fractal(14.0, 4.0, 0.1, 0.8);
+  canvas.fractal(16.0, 0.08, 0.004, 0.9);
+  const int blades = static_cast<int>(350.0 * canvas.width() * canvas.height());
+  for (int i = 0; i < blades; ++i) {
+    const double x = canvas.uniform(0.0, canvas.width());
+    const double y = canvas.uniform(0.0, canvas.height());
+    const double angle = canvas.uniform(0.0, 6.28);
+    const double length = canvas.uniform(0.03, 0.10);
+    canvas.line(x, y, x + length * std::cos(angle), y + length * std::sin(angle), 0.004, canvas.uniform(45.0, 165.0));
+  }
+  for (int i = 0; i < static_cast<int>(3.0 * canvas.width() * canvas.height()); ++i) {  // daisies, leaves, stones
+    canvas.circle(canvas.uniform(0.0, canvas.width()), canvas.uniform(0.0, canvas.height()),
+                  canvas.uniform(0.008, 0.03), canvas.uniform(30.0, 235.0));
+  }
+}
+
+// Pebbles of many sizes, trodden earth.
+void paint_gravel(Canvas& canvas) {
+  canvas.fill(120.0);
+  canvas.fractal(14.0, 3.0, 0.1, 0.8);
+  canvas.fractal(14.0, 0.08, 0.004, 0.9);
+  const int pebbles = static_cast<int>(250.0 * canvas.width() * canvas.height());
+  for (int i = 0; i < pebbles; ++i) {
+    const double size = 0.006 + 0.04 * std::pow(canvas.uniform(0.0, 1.0), 4.0);
+    canvas.circle(canvas.uniform(0.0, canvas.width()), canvas.uniform(0.0, canvas.height()), size,
+                  canvas.uniform(60.0, 200.0));
+  }
+  scuffs(canvas, 30.0, 0.3, 50.0);
+}
+
+// Leaves in light and shade.
+void paint_foliage(Canvas& canvas) {
+  canvas.fill(70.0);
+  canvas.fractal(26.0, 0.8, 0.01, 0.85);
+  const int leaves = static_cast<int>(300.0 * canvas.width() * canvas.height());
+  for (int i = 0; i < leaves; ++i) {
+    canvas.circle(canvas.uniform(0.0, canvas.width()), canvas.uniform(0.0, canvas.height()),
+                  canvas.uniform(0.01, 0.035), canvas.uniform(25.0, 150.0));
+  }
+}
+
+// Plaster with rows of windows.
+void paint_facade(Canvas& canvas) {
+  canvas.fill(canvas.uniform(135.0, 190.0));
+  canvas.fractal(8.0, 3.0, 0.02, 0.8);
+  for (double y = 0.8; y + 1.6 < canvas.height(); y += 2.8) {
+    for (double x = canvas.uniform(0.4, 1.2); x + 1.2 < canvas.width(); x += canvas.uniform(1.8, 3.0)) {
+      canvas.rectangle(x - 0.08, y - 0.08, 1.26, 1.66, 215.0);
+      canvas.rectangle(x, y, 1.1, 1.5, canvas.uniform(35.0, 90.0));
+      canvas.rectangle(x + 0.52, y, 0.06, 1.5, 205.0);
+      canvas.rectangle(x, y + 0.5, 1.1, 0.05, 205.0);
+      canvas.rectangle(x, y + canvas.uniform(0.9, 1.4), 1.1, 0.2, canvas.uniform(80.0, 180.0));  // a curtain, a sill
+    }
+  }
+  scuffs(canvas, 3.0, 0.5, 35.0);
+}
+
+// Clouds; nothing in them is sharp.
+void paint_sky(Canvas& canvas) {
+  canvas.fill(205.0);
+  canvas.fractal(16.0, 40.0, 2.0, 0.6);
+}
+
 struct Look {
   double texel;  // [m]
   void (*paint)(Canvas&);
@@ -372,6 +438,16 @@ Look look_of(Material material) {
       return {0.0025, paint_concrete};
     case Material::metal:
       return {0.0025, paint_metal};
+    case Material::grass:
+      return {0.003, paint_grass};
+    case Material::gravel:
+      return {0.003, paint_gravel};
+    case Material::foliage:
+      return {0.005, paint_foliage};
+    case Material::facade:
+      return {0.008, paint_facade};
+    case Material::sky:
+      return {0.1, paint_sky};
   }
   return {0.003, paint_wall};
 }
@@ -395,7 +471,7 @@ double brightness_of(const Panel& panel) {
 Appearance paint_room(const Scene& scene, std::uint64_t seed) {
   Rng rng = make_rng(seed, Stream::scene);
   const Panel ground{Eigen::Vector3d::Zero(), Eigen::Vector3d::UnitX(), Eigen::Vector3d::UnitY(),
-                     scene.size.x(),          scene.size.y(),           Material::floor};
+                     scene.size.x(),          scene.size.y(),           scene.ground};
   Appearance appearance{{}, paint(ground, 1.12, rng)};
   for (const Panel& panel : scene.panels) appearance.panels.push_back(paint(panel, brightness_of(panel), rng));
   return appearance;

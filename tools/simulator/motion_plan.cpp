@@ -21,6 +21,9 @@ constexpr double kSmoothing = 0.3;  // [s] each
 constexpr double kLeanPerAcceleration = 6.0 * kDegree;  // [rad/(m/s^2)]
 constexpr double kLeanPerSlope = 0.4;                   // [rad/rad]
 
+// A wheel that loses its grip is light: it takes no longer than this to slip, and to grip again.
+constexpr double kSlipOnset = 0.1;  // [s]
+
 // Flight.
 constexpr double kDragTilt = 1.0 * kDegree;  // [rad/(m/s)]
 constexpr double kBobbing = 0.03;            // [m]
@@ -60,15 +63,19 @@ std::vector<double> smooth(std::vector<double> values) {
   return values;
 }
 
+std::size_t periods_of(const Leg& leg) {
+  return static_cast<std::size_t>(std::max(1L, std::lround(leg.duration / kPeriod)));
+}
+
 Commands smooth_commands(const std::vector<Leg>& legs) {
   Commands commands;
   double falling = 0.0;  // climb rate of a landing, kept up beyond its leg: the ground ends the fall, not the plan
   int keep_falling = 0;
   for (const Leg& leg : legs) {
-    const int periods = std::max(1, static_cast<int>(std::lround(leg.duration / kPeriod)));
-    const double duration = periods * kPeriod;
+    const std::size_t periods = periods_of(leg);
+    const double duration = static_cast<double>(periods) * kPeriod;
     const double climb = leg.climb / duration;
-    for (int i = 0; i < periods; ++i) {
+    for (std::size_t i = 0; i < periods; ++i) {
       commands.forward.push_back(leg.forward / duration);
       commands.lateral.push_back(leg.lateral / duration);
       commands.yaw_rate.push_back(leg.turn / duration);
@@ -83,6 +90,24 @@ Commands smooth_commands(const std::vector<Leg>& legs) {
   }
   return {smooth(commands.forward), smooth(commands.lateral), smooth(commands.yaw_rate), smooth(commands.climb),
           smooth(commands.swing)};
+}
+
+std::vector<std::array<double, 2>> smooth_slip(const std::vector<Leg>& legs) {
+  const auto slips = [](const Leg& leg) { return leg.slip_left != 0.0 || leg.slip_right != 0.0; };
+  if (std::none_of(legs.begin(), legs.end(), slips)) return {};
+  std::vector<double> left;
+  std::vector<double> right;
+  for (const Leg& leg : legs) {
+    left.insert(left.end(), periods_of(leg), leg.slip_left);
+    right.insert(right.end(), periods_of(leg), leg.slip_right);
+  }
+  const int half = static_cast<int>(std::lround(0.5 * kSlipOnset / kPeriod));
+  left = moving_average(moving_average(left, half), half);
+  right = moving_average(moving_average(right, half), half);
+  std::vector<std::array<double, 2>> slip;
+  slip.reserve(left.size());
+  for (std::size_t i = 0; i < left.size(); ++i) slip.push_back({left[i], right[i]});
+  return slip;
 }
 
 // Height of the wheels above the ground, and when they touch down.
@@ -253,7 +278,8 @@ MotionPlan plan_motion(const Sequence& sequence, const EncoderCalibration& axle,
   }
   states.block<2, 1>(4, 0) = states.block<2, 1>(4, 1);
   states.block<2, 1>(4, n - 1) = states.block<2, 1>(4, n - 2);
-  return {Trajectory(kPeriod, std::move(states), axle.T_BO), heights.mode, heights.touchdowns};
+  return {Trajectory(kPeriod, std::move(states), axle.T_BO), heights.mode, heights.touchdowns,
+          smooth_slip(sequence.legs)};
 }
 
 }  // namespace ear::simulator

@@ -20,7 +20,9 @@ enum class Stream : std::uint32_t {
   calibration = 6,
   scene = 7,
   exposure = 8,
-  pixels = 9
+  pixels = 9,
+  laser_faults = 10,
+  obstruction = 11
 };
 
 [[nodiscard]] inline Rng make_rng(std::uint64_t seed, Stream stream) {

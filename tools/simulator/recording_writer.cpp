@@ -238,8 +238,12 @@ void render_images(const Simulation& simulation, const fs::path& directory, int 
     const TimeNs t_ns = times[index / cameras.size()];
     const std::size_t camera = index % cameras.size();
     const double t = motion_time(t_ns);
-    const cv::Mat grey =
-        renderer.render(camera, simulation.plan().trajectory, t, exposure_at(t, simulation.options().seed));
+    const Obstruction& obstruction = simulation.obstruction();
+    cv::Mat grey(cameras[camera].height, cameras[camera].width, CV_32FC1, cv::Scalar(0.0));
+    if (!obstruction.covered(t)) {
+      grey = renderer.render(camera, simulation.plan().trajectory, t, exposure_at(t, simulation.options().seed));
+    }
+    draw_obstruction(obstruction, cameras[camera], camera, t, grey);
     const fs::path path = image_path(directory, camera, t_ns);
     if (!cv::imwrite(path.string(), sensor.read(grey, picture_key(simulation.options().seed, t_ns, camera)), png)) {
       throw std::runtime_error(path.string() + ": cannot be written");

@@ -202,8 +202,16 @@ void see_nearest(const Candidate& candidate, const Box& box, Row& row) {
   }
 }
 
+// Outdoors the ground's picture goes on beyond its border, as in a mirror: seamless, and itself again after two sizes.
+double mirrored(double place, double size) {
+  const double in_pair = place - 2.0 * size * std::floor(place / (2.0 * size));
+  return in_pair <= size ? in_pair : 2.0 * size - in_pair;
+}
+
 // A wavy ground, where it is nearer than what the row sees.
-void see_ground(const Terrain& terrain, const Texture& texture, const Eigen::Isometry3d& T_WC, float focal, Row& row) {
+void see_ground(const Scene& scene, const Texture& texture, const Eigen::Isometry3d& T_WC, float focal, Row& row) {
+  const Terrain& terrain = scene.terrain;
+  const Eigen::Vector2d& size = scene.size;
   for (std::size_t i = 0; i < kTile; ++i) {
     const Eigen::Vector3d toward_C(row.x[i], row.y[i], 1.0);
     const double length = toward_C.norm();
@@ -213,8 +221,8 @@ void see_ground(const Terrain& terrain, const Texture& texture, const Eigen::Iso
     const Eigen::Vector3d p_W = T_WC.translation() + *range * direction_W;
     const double facing = std::max(0.02, -terrain.normal(p_W.x(), p_W.y()).dot(direction_W));
     const auto minor = static_cast<float>(*range / length);
-    row.a[i] = static_cast<float>(p_W.x());
-    row.b[i] = static_cast<float>(p_W.y());
+    row.a[i] = static_cast<float>(mirrored(p_W.x(), size.x()));
+    row.b[i] = static_cast<float>(mirrored(p_W.y(), size.y()));
     row.level[i] = texture.level_of(wanted_detail(minor, minor / static_cast<float>(facing)) / focal);
     row.texture[i] = &texture;
   }
@@ -303,7 +311,7 @@ void Renderer::add_sub_picture(const Eye& eye, const Eigen::Isometry3d& T_WC, st
           row.texture.fill(nullptr);
           for (const Candidate& candidate : candidates) see_nearest(candidate, box, row);
         }
-        if (!scene_.terrain.flat()) see_ground(scene_.terrain, appearance_.ground, T_WC, eye.focal, row);
+        if (!scene_.terrain.flat()) see_ground(scene_, appearance_.ground, T_WC, eye.focal, row);
         float* out = sum.ptr<float>(v) + left;
         for (std::size_t i = 0; i < kTile; ++i) {
           if (row.texture[i] != nullptr) out[i] += row.texture[i]->at(row.a[i], row.b[i], row.level[i] + threshold);

@@ -6,12 +6,29 @@
 #include <optional>
 #include <vector>
 
+#include "tools/simulator/sequence.h"
 #include "tools/simulator/terrain.h"
 
 namespace ear::simulator {
 
 /// What a panel looks like (texture.h).
-enum class Material { floor, wall, brick, ceiling, wood, cardboard, poster, shelf, concrete, metal };
+enum class Material {
+  floor,
+  wall,
+  brick,
+  ceiling,
+  wood,
+  cardboard,
+  poster,
+  shelf,
+  concrete,
+  metal,
+  grass,
+  gravel,
+  foliage,
+  facade,
+  sky
+};
 
 /// A one-sided rectangle: corner + a u + b v with 0 <= a <= width, 0 <= b <= height; seen from where its normal points.
 struct Panel {
@@ -41,7 +58,9 @@ inline constexpr int kGround = -1;
 struct Scene {
   Terrain terrain;
   std::vector<Panel> panels;
-  Eigen::Vector2d size = Eigen::Vector2d::Zero();  ///< of the ground, from (0, 0) [m]
+  /// Of the ground, from (0, 0) [m]; outdoors it goes on, mirrored at each border.
+  Eigen::Vector2d size = Eigen::Vector2d::Zero();
+  Material ground = Material::floor;
 
   /// The first surface that a ray (unit direction) meets.
   [[nodiscard]] std::optional<Hit> cast(const Eigen::Vector3d& origin_W, const Eigen::Vector3d& direction_W) const;
@@ -50,7 +69,10 @@ struct Scene {
   [[nodiscard]] bool sees(const Eigen::Vector3d& from_W, const Eigen::Vector3d& to_W) const;
 };
 
-/// The indoor room of every sequence: 12 x 9 x 3.5 m with boxes, shelves, pillars and posters.
+/// Outdoors: the ground with bushes, trees and houses at some distance, under a clouded sky.
+[[nodiscard]] Scene make_outdoors(Place place, const Terrain& terrain);
+
+/// The indoor room: 12 x 9 x 3.5 m with boxes, shelves, pillars and posters.
 [[nodiscard]] Scene make_room(const Terrain& terrain);
 
 /// Footprints of what stands on the floor of that room: (min x, min y, max x, max y) [m]. Paths keep away from them.

@@ -112,4 +112,25 @@ std::vector<LaserSample> read_lasers(const Trajectory& trajectory, const Terrain
   return samples;
 }
 
+void corrupt_lasers(std::vector<LaserSample>& samples, const LaserCalibration& lasers, const LaserFaults& faults,
+                    Rng& rng) {
+  if (faults.lost == 0.0 && faults.wrong == 0.0 && faults.fades == 0.0) return;
+  std::vector<TimeNs> faded_until(lasers.beams.size(), 0);
+  for (LaserSample& sample : samples) {
+    for (std::size_t beam = 0; beam < sample.range.size(); ++beam) {
+      double& range = sample.range[beam];
+      if (uniform(rng, 0.0, 1.0) < faults.fades / lasers.rate_hz) {
+        faded_until[beam] = sample.t_ns + std::llround(1e9 * uniform(rng, 0.2, 1.0));
+      }
+      if (uniform(rng, 0.0, 1.0) < faults.wrong) {
+        // Mostly something above the ground; one in four goes past an edge, or returns by a detour.
+        const bool nearer = uniform(rng, 0.0, 1.0) < 0.75;
+        range = nearer ? range * uniform(rng, 0.3, 0.85) : range + uniform(rng, 0.05, 0.5);
+      }
+      const bool lost = uniform(rng, 0.0, 1.0) < faults.lost || sample.t_ns < faded_until[beam];
+      if (lost || !(range >= lasers.range_min && range <= lasers.range_max)) range = std::nan("");
+    }
+  }
+}
+
 }  // namespace ear::simulator

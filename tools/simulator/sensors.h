@@ -6,6 +6,7 @@
 #include "ear/calibration.h"
 #include "ear/types.h"
 #include "tools/simulator/random.h"
+#include "tools/simulator/sequence.h"
 #include "tools/simulator/terrain.h"
 #include "tools/simulator/trajectory.h"
 #include "tools/simulator/wheel_motion.h"
@@ -46,5 +47,9 @@ void corrupt_imu(std::vector<ImuSample>& samples, const ImuCalibration& imu, con
 [[nodiscard]] std::vector<LaserSample> read_lasers(const Trajectory& trajectory, const Terrain& terrain,
                                                    const LaserCalibration& lasers, const std::vector<TimeNs>& stamps,
                                                    Rng& rng);
+
+/// Readings that are lost or wrong; does nothing, and draws nothing, without faults.
+void corrupt_lasers(std::vector<LaserSample>& samples, const LaserCalibration& lasers, const LaserFaults& faults,
+                    Rng& rng);
 
 }  // namespace ear::simulator

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,12 +13,30 @@ namespace ear::simulator {
 
 /// A piece of the plan with constant commands; the motion smooths the corners between legs (motion_plan.h).
 struct Leg {
-  double duration = 0.0;  ///< [s]
-  double forward = 0.0;   ///< distance along the heading [m]
-  double lateral = 0.0;   ///< distance to the left [m], in the air only
-  double turn = 0.0;      ///< change of heading, left positive [rad]
-  double climb = 0.0;     ///< change of height above the ground [m]; the leg that comes back to 0 ends with a strike
-  double swing = 0.0;     ///< amplitude of the body's swing about the axle [rad]
+  double duration = 0.0;    ///< [s]
+  double forward = 0.0;     ///< distance along the heading [m]
+  double lateral = 0.0;     ///< distance to the left [m], in the air only
+  double turn = 0.0;        ///< change of heading, left positive [rad]
+  double climb = 0.0;       ///< change of height above the ground [m]; the leg that comes back to 0 ends with a strike
+  double swing = 0.0;       ///< amplitude of the body's swing about the axle [rad]
+  double slip_left = 0.0;   ///< speed of the left wheel's rim beyond that of rolling [m/s]; negative when it drags
+  double slip_right = 0.0;  ///< of the right one
+};
+
+/// What surrounds the vehicle.
+enum class Place { room, hillside, garden };
+
+/// What goes wrong with the lasers, each beam for itself.
+struct LaserFaults {
+  double lost = 0.0;   ///< share of the readings without a return
+  double wrong = 0.0;  ///< share of the readings that meet something else than the ground
+  double fades = 0.0;  ///< times per second that a beam gives nothing for 0.2 to 1.0 s
+};
+
+/// What gets between the cameras and the scene.
+struct Hindrance {
+  std::optional<double> covered_after;  ///< the lenses are covered from here to the end [s]
+  double tufts = 0.0;                   ///< tufts of grass per second that pass before the lenses
 };
 
 struct Sequence {
@@ -27,6 +46,9 @@ struct Sequence {
   Eigen::Vector2d start = Eigen::Vector2d::Zero();  ///< middle of the axle [m]
   double heading = 0.0;                             ///< at the start [rad]
   std::vector<Leg> legs;
+  Place place = Place::room;
+  LaserFaults laser_faults = {};
+  Hindrance hindrance = {};
 };
 
 /// The names that `find_sequence` knows.

@@ -39,6 +39,15 @@ MotionPlan planned(const Options& options, const Sequence& sequence, const Encod
   return plan_motion(sequence, axle, rng);
 }
 
+Obstruction drawn_obstruction(const Options& options, const Sequence& sequence, double duration) {
+  Rng rng = make_rng(options.seed, Stream::obstruction);
+  return {sequence.hindrance, duration, rng};
+}
+
+Scene make_scene(Place place, const Terrain& terrain) {
+  return place == Place::room ? make_room(terrain) : make_outdoors(place, terrain);
+}
+
 // The sensors as they are, or without their noise.
 Calibration sensors_of(const Options& options, Calibration calibration) {
   if (!options.sensor_noise) {
@@ -56,9 +65,10 @@ Simulation::Simulation(const Options& options, const Sequence& sequence)
     : options_(options),
       true_calibration_(make_vehicle(options.camera_rate_hz, options.lens)),
       calibration_(told_calibration(options, true_calibration_)),
-      scene_(make_room(sequence.terrain)),
+      scene_(make_scene(sequence.place, sequence.terrain)),
       plan_(planned(options, sequence, *true_calibration_.encoder)),
       wheels_(plan_, sequence.terrain, *true_calibration_.encoder),
+      obstruction_(drawn_obstruction(options, sequence, plan_.trajectory.duration())),
       duration_(options.duration.value_or(plan_.trajectory.duration() - 0.2)) {
   const double end = kImuPhase + duration_;
   const Calibration sensors = sensors_of(options, true_calibration_);
@@ -80,11 +90,16 @@ Simulation::Simulation(const Options& options, const Sequence& sequence)
   Rng laser_rng = make_rng(options.seed, Stream::laser);
   lasers_ = read_lasers(trajectory, sequence.terrain, *sensors.lasers,
                         regular_stamps(sensors.lasers->rate_hz, kLaserPhase, end), laser_rng);
+  if (options.sensor_noise) {
+    Rng fault_rng = make_rng(options.seed, Stream::laser_faults);
+    corrupt_lasers(lasers_, *sensors.lasers, sequence.laser_faults, fault_rng);
+  }
 
   frame_times_ = regular_stamps(options.camera_rate_hz, kCameraPhase, end);
   if (options.tracks) {
     Rng track_rng = make_rng(options.seed, Stream::tracks);
-    tracks_ = generate_tracks(scene_, trajectory, sensors.cameras, frame_times_, options.track, track_rng);
+    tracks_ =
+        generate_tracks(scene_, trajectory, sensors.cameras, frame_times_, obstruction_, options.track, track_rng);
   }
 }
 

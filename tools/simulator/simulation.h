@@ -14,6 +14,7 @@
 #include "ear/calibration.h"
 #include "ear/types.h"
 #include "tools/simulator/motion_plan.h"
+#include "tools/simulator/obstruction.h"
 #include "tools/simulator/scene.h"
 #include "tools/simulator/sensors.h"
 #include "tools/simulator/track_generator.h"
@@ -28,7 +29,7 @@ struct Options {
   std::optional<double> duration;    ///< [s] stop earlier, or keep standing at the end for longer
   double camera_rate_hz = 30.0;
   LensModel lens = LensModel::radial_tangential;
-  bool sensor_noise = true;  ///< false: IMU without noise and biases, encoders and lasers without noise
+  bool sensor_noise = true;  ///< false: IMU without noise and biases, encoders and lasers without noise and faults
   bool tracks = true;        ///< false: no feature tracks, for recordings of images
   TrackOptions track;
 };
@@ -72,6 +73,8 @@ class Simulation {
   [[nodiscard]] const FeatureFrame& tracks(std::size_t frame) const { return tracks_.at(frame); }
 
   [[nodiscard]] const Scene& scene() const { return scene_; }
+  /// What is before the lenses.
+  [[nodiscard]] const Obstruction& obstruction() const { return obstruction_; }
   [[nodiscard]] const MotionPlan& plan() const { return plan_; }
   [[nodiscard]] const Options& options() const { return options_; }
 
@@ -84,6 +87,7 @@ class Simulation {
   Scene scene_;
   MotionPlan plan_;
   WheelMotion wheels_;
+  Obstruction obstruction_;
   double duration_;
   std::vector<ImuSample> imu_;
   std::vector<ImuBias> biases_;  // at the stamps of imu_

@@ -34,6 +34,16 @@ Eigen::Vector2d Terrain::gradient(double x, double y) const {
   return sum;
 }
 
+Terrain::Patch Terrain::patch(double x, double y) const {
+  Patch patch{0.0, Eigen::Vector2d::Zero()};
+  for (const GroundWave& wave : waves_) {
+    const double argument = wave.wave_vector.x() * x + wave.wave_vector.y() * y + wave.phase;
+    patch.height += wave.amplitude * std::sin(argument);
+    patch.gradient += wave.amplitude * std::cos(argument) * wave.wave_vector;
+  }
+  return patch;
+}
+
 Eigen::Vector3d Terrain::normal(double x, double y) const {
   const Eigen::Vector2d slope = gradient(x, y);
   return Eigen::Vector3d(-slope.x(), -slope.y(), 1.0).normalized();
@@ -69,10 +79,11 @@ std::optional<double> Terrain::cast(const Eigen::Vector3d& origin_W, const Eigen
   for (int i = 0; i < kMostSteps && range <= farthest; ++i) {
     const Eigen::Vector3d p_W = origin_W + range * direction_W;
     if (descent <= 0.0 && p_W.z() > top) return std::nullopt;
-    const double gap = p_W.z() - height(p_W.x(), p_W.y());
+    const Patch ground = patch(p_W.x(), p_W.y());
+    const double gap = p_W.z() - ground.height;
     if (gap < -kClose) return std::nullopt;  // starts below the ground
     if (gap < kClose) return range;
-    const double slope = direction_W.z() - gradient(p_W.x(), p_W.y()).dot(along);
+    const double slope = direction_W.z() - ground.gradient.dot(along);
     const double root = std::sqrt(slope * slope + 2.0 * curving * gap);
     range += slope < 0.0 ? 2.0 * gap / (root - slope) : (slope + root) / curving;
   }

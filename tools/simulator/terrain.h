@@ -35,6 +35,13 @@ class Terrain {
                                            double max_range = std::numeric_limits<double>::infinity()) const;
 
  private:
+  struct Patch {
+    double height;
+    Eigen::Vector2d gradient;
+  };
+  // Both at once, for half the time.
+  [[nodiscard]] Patch patch(double x, double y) const;
+
   std::vector<GroundWave> waves_;
   double sharpest_ = 0.0;  // no curvature of the ground exceeds it [1/m]
 };

@@ -10,9 +10,10 @@
 namespace ear::simulator {
 namespace {
 
-constexpr double kCell = 40.0;    // [px] one feature per cell is drawn before any cell gets its second
-constexpr double kMargin = 3.0;   // [px] front ends keep away from the border
-constexpr double kFarthest = 30;  // [m]
+constexpr double kCell = 40.0;       // [px] one feature per cell is drawn before any cell gets its second
+constexpr double kMargin = 3.0;      // [px] front ends keep away from the border
+constexpr double kFarthest = 30;     // [m]
+constexpr double kMostVeiled = 0.3;  // what something before the lens dims more than this cannot be followed
 
 struct Landmark {
   std::uint64_t id;
@@ -27,12 +28,24 @@ Eigen::Isometry3d pose_of(const Kinematics& motion, const CameraCalibration& cam
   return T_WB * camera.T_BC;
 }
 
+// One camera at one instant.
+struct View {
+  const Scene& scene;
+  const CameraCalibration& camera;
+  Eigen::Isometry3d T_WC;
+  const Obstruction& obstruction;
+  std::size_t index;  // of the camera
+  double t;           // [s]
+};
+
 // Where a camera sees a point, if it does.
-std::optional<Eigen::Vector2d> see(const Scene& scene, const CameraCalibration& camera, const Eigen::Isometry3d& T_WC,
-                                   const Eigen::Vector3d& p_W) {
-  const Eigen::Vector3d p_C = T_WC.linear().transpose() * (p_W - T_WC.translation());
-  const auto pixel = project(camera, p_C, kMargin);
-  return pixel && scene.sees(T_WC.translation(), p_W) ? pixel : std::nullopt;
+std::optional<Eigen::Vector2d> see(const View& view, const Eigen::Vector3d& p_W) {
+  const Eigen::Vector3d p_C = view.T_WC.linear().transpose() * (p_W - view.T_WC.translation());
+  const auto pixel = project(view.camera, p_C, kMargin);
+  if (!pixel || view.obstruction.veil(view.index, view.t, p_C.hnormalized()).opacity > kMostVeiled) {
+    return std::nullopt;
+  }
+  return view.scene.sees(view.T_WC.translation(), p_W) ? pixel : std::nullopt;
 }
 
 Eigen::Vector2d measure(const CameraCalibration& camera, const Eigen::Vector2d& pixel, double sigma_px, Rng& rng) {
@@ -42,8 +55,9 @@ Eigen::Vector2d measure(const CameraCalibration& camera, const Eigen::Vector2d& 
 }
 
 // Fills empty cells of the grid, in random order, with points on whatever the camera sees there.
-void replenish(std::vector<Landmark>& landmarks, std::uint64_t& next_id, const Scene& scene,
-               const CameraCalibration& camera, const Eigen::Isometry3d& T_WC, int max_features, Rng& rng) {
+void replenish(std::vector<Landmark>& landmarks, std::uint64_t& next_id, const View& view, int max_features, Rng& rng) {
+  const CameraCalibration& camera = view.camera;
+  const Eigen::Isometry3d& T_WC = view.T_WC;
   const int columns = static_cast<int>(std::ceil(camera.width / kCell));
   const int rows = static_cast<int>(std::ceil(camera.height / kCell));
   std::vector<char> taken(static_cast<std::size_t>(columns * rows), 0);
@@ -64,10 +78,10 @@ void replenish(std::vector<Landmark>& landmarks, std::uint64_t& next_id, const S
     const double u = kCell * (static_cast<double>(column) + uniform(rng, 0.0, 1.0));
     const double v = kCell * (static_cast<double>(row) + uniform(rng, 0.0, 1.0));
     const Eigen::Vector3d direction_W = T_WC.linear() * to_ray(camera, {u, v}).homogeneous().normalized();
-    const auto hit = scene.cast(T_WC.translation(), direction_W);
+    const auto hit = view.scene.cast(T_WC.translation(), direction_W);
     if (!hit || hit->range > kFarthest) continue;
     const Eigen::Vector3d p_W = T_WC.translation() + hit->range * direction_W;
-    const auto pixel = see(scene, camera, T_WC, p_W);
+    const auto pixel = see(view, p_W);
     if (pixel) landmarks.push_back({next_id++, p_W, *pixel});
   }
 }
@@ -76,7 +90,8 @@ void replenish(std::vector<Landmark>& landmarks, std::uint64_t& next_id, const S
 
 std::vector<FeatureFrame> generate_tracks(const Scene& scene, const Trajectory& trajectory,
                                           const std::vector<CameraCalibration>& cameras,
-                                          const std::vector<TimeNs>& stamps, const TrackOptions& options, Rng& rng) {
+                                          const std::vector<TimeNs>& stamps, const Obstruction& obstruction,
+                                          const TrackOptions& options, Rng& rng) {
   const CameraCalibration& left = cameras.front();
   std::vector<FeatureFrame> frames;
   frames.reserve(stamps.size());
@@ -85,17 +100,17 @@ std::vector<FeatureFrame> generate_tracks(const Scene& scene, const Trajectory& 
   TimeNs previous_ns = stamps.empty() ? 0 : stamps.front();
   for (const TimeNs t_ns : stamps) {
     const Kinematics motion = trajectory.at(motion_time(t_ns));
-    const Eigen::Isometry3d T_WC0 = pose_of(motion, left);
+    const View left_view{scene, left, pose_of(motion, left), obstruction, 0, motion_time(t_ns)};
 
     const double loss = 1.0 - std::exp(-seconds_between(previous_ns, t_ns) / options.mean_life);
     previous_ns = t_ns;
     std::vector<Landmark> kept;
     for (const Landmark& landmark : landmarks) {
       if (uniform(rng, 0.0, 1.0) < loss) continue;
-      if (const auto pixel = see(scene, left, T_WC0, landmark.p_W)) kept.push_back({landmark.id, landmark.p_W, *pixel});
+      if (const auto pixel = see(left_view, landmark.p_W)) kept.push_back({landmark.id, landmark.p_W, *pixel});
     }
     landmarks = std::move(kept);
-    replenish(landmarks, next_id, scene, left, T_WC0, options.max_features, rng);
+    replenish(landmarks, next_id, left_view, options.max_features, rng);
 
     FeatureFrame frame{t_ns, {}};
     frame.features.reserve(landmarks.size());
@@ -104,7 +119,8 @@ std::vector<FeatureFrame> generate_tracks(const Scene& scene, const Trajectory& 
       seen.id = landmark.id;
       seen.left = measure(left, landmark.pixel, options.sigma_px, rng);
       if (cameras.size() > 1) {
-        if (const auto pixel = see(scene, cameras[1], pose_of(motion, cameras[1]), landmark.p_W)) {
+        const View right_view{scene, cameras[1], pose_of(motion, cameras[1]), obstruction, 1, left_view.t};
+        if (const auto pixel = see(right_view, landmark.p_W)) {
           seen.right = measure(cameras[1], *pixel, options.sigma_px, rng);
           seen.has_right = true;
         }

@@ -5,6 +5,7 @@
 
 #include "ear/calibration.h"
 #include "ear/types.h"
+#include "tools/simulator/obstruction.h"
 #include "tools/simulator/random.h"
 #include "tools/simulator/scene.h"
 #include "tools/simulator/trajectory.h"
@@ -14,7 +15,7 @@ namespace ear::simulator {
 struct TrackOptions {
   int max_features = 150;  ///< at one time
   double sigma_px = 0.5;   ///< of each coordinate, independent in both cameras
-  double mean_life = 4.0;  ///< [s] until a track is lost by chance; it also ends at the border and behind things
+  double mean_life = 4.0;  ///< [s] until a track is lost by chance; it also ends at the border, behind and under things
 };
 
 /// One frame per stamp. Features are in the left picture, spread over it by a grid, and `has_right` if the right camera
@@ -22,7 +23,8 @@ struct TrackOptions {
 /// A feature keeps its id while it lives; no id is used twice.
 [[nodiscard]] std::vector<FeatureFrame> generate_tracks(const Scene& scene, const Trajectory& trajectory,
                                                         const std::vector<CameraCalibration>& cameras,
-                                                        const std::vector<TimeNs>& stamps, const TrackOptions& options,
+                                                        const std::vector<TimeNs>& stamps,
+                                                        const Obstruction& obstruction, const TrackOptions& options,
                                                         Rng& rng);
 
 }  // namespace ear::simulator

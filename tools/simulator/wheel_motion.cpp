@@ -46,6 +46,17 @@ WheelMotion::WheelMotion(const MotionPlan& plan, const Terrain& terrain, const E
   bool rolling = true;
   std::array<double, 2> coasting{};
 
+  // Slip that the plan asks for, left and right [m/s].
+  const auto planned_slip = [&plan, this](double t) {
+    if (plan.slip.empty()) return std::array<double, 2>{};
+    const double position = std::clamp(t / period_, 0.0, static_cast<double>(plan.slip.size() - 1));
+    const auto i = std::min(static_cast<std::size_t>(position), plan.slip.size() - 2);
+    const double f = position - static_cast<double>(i);
+    const std::array<double, 2>& a = plan.slip[i];
+    const std::array<double, 2>& b = plan.slip[i + 1];
+    return std::array<double, 2>{a[0] + f * (b[0] - a[0]), a[1] + f * (b[1] - a[1])};
+  };
+
   // Rates at one instant; `t` never decreases.
   const auto rates_at = [&](double t, bool in_air) {
     const std::array<double, 2> roll = rolling_rates(plan.trajectory.at(t), terrain, axle);
@@ -59,7 +70,9 @@ WheelMotion::WheelMotion(const MotionPlan& plan, const Terrain& terrain, const E
     }
     if (!rolling) return coasting;
     const double left = contact_since < 0.0 ? 0.0 : std::exp(-(t - contact_since) / kSpinUp);
-    return std::array<double, 2>{roll[0] + left * excess[0], roll[1] + left * excess[1]};
+    const std::array<double, 2> slip = planned_slip(t);
+    return std::array<double, 2>{roll[0] + left * excess[0] + slip[0] / axle.wheel_radius[0],
+                                 roll[1] + left * excess[1] + slip[1] / axle.wheel_radius[1]};
   };
 
   const double half = 0.5 * period_;
@@ -74,6 +87,10 @@ WheelMotion::WheelMotion(const MotionPlan& plan, const Terrain& terrain, const E
     knot.rate = rates_at(t, in_air);
     if (rolling && contact_since >= 0.0) {
       knot.slip = std::exp(-(t - contact_since) / kSpinUp) * mean_radius * 0.5 * (excess[0] + excess[1]);
+    }
+    if (rolling) {
+      const std::array<double, 2> slip = planned_slip(t);
+      knot.slip += 0.5 * (slip[0] + slip[1]);
     }
     if (i + 1 == knots_.size()) break;
     // Simpson's rule over the period; the next knot's rate is computed again above, from the same state.

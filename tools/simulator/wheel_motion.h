@@ -18,6 +18,7 @@ class WheelMotion {
  public:
   /// Integrates the rates over the whole plan. Wheels in the air lose their speed with a time constant of 2 s, and are
   /// spun up again within some 60 ms after the touchdown.
+  /// On the ground they slip as the plan says.
   WheelMotion(const MotionPlan& plan, const Terrain& terrain, const EncoderCalibration& axle);
 
   /// Angles relative to the body [rad], left and right, zero at the start.
