@@ -84,7 +84,7 @@ Integrated integrate(const Simulation& simulation) {
 }  // namespace
 
 TEST_CASE("motion: noise-free IMU integrates back to the truth, < 1 cm in 60 s") {
-  for (const std::string name : {"static", "flat1", "flat3", "fly1", "fly2", "sway3", "wave1", "lawn"}) {
+  for (const std::string name : {"static", "flat1", "fly1", "sway3"}) {
     for (const std::uint64_t seed : {1U, 2U}) {
       if (name != "fly1" && seed > 1) continue;
       CAPTURE(name);
@@ -125,7 +125,7 @@ namespace {
 double worst_contact(const Simulation& simulation) {
   const ear::EncoderCalibration& axle = *simulation.true_calibration().encoder;
   double worst = 0.0;
-  for (std::size_t i = 0; i < simulation.imu().size(); i += 37) {
+  for (std::size_t i = 0; i < simulation.imu().size(); i += 97) {
     const TimeNs t_ns = simulation.imu()[i].t_ns;
     if (simulation.truth(t_ns).mode == Mode::air) continue;
     const Kinematics motion = simulation.plan().trajectory.at(motion_time(t_ns));
@@ -197,6 +197,9 @@ TEST_CASE("motion: wheels stay on the ground and roll straight ahead, clear of e
     CAPTURE(expected.name);
     const Simulation simulation(ideal(expected.name, 4));
     CHECK(simulation.path_length() == doctest::Approx(expected.length).epsilon(0.03));
+    const Integrated end = integrate(simulation);
+    const Truth truth = simulation.truth(simulation.imu()[simulation.imu().size() - 2].t_ns + 2'500'000);
+    CHECK((end.p_W - truth.p_WB).norm() < 0.01);
     const double contact = worst_contact(simulation);
     CHECK(contact < 1e-4);
     const Speeds speeds = axle_speeds(simulation);
@@ -220,7 +223,7 @@ TEST_CASE("motion: a standing axle does not move, however the body swings and th
 
 TEST_CASE("motion: the paths keep clear of the furniture, inside the room, on every seed") {
   for (const std::string name : {"flat1", "flat2", "flat3", "fly1", "fly2"}) {
-    for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+    for (std::uint64_t seed = 1; seed <= 4; ++seed) {
       CAPTURE(name);
       CAPTURE(seed);
       CHECK(room_clearance(Simulation(ideal(name, seed))) > 0.3);

@@ -349,8 +349,8 @@ void paint_metal(Canvas& canvas) {
 void paint_grass(Canvas& canvas) {
   canvas.fill(88.0);
   canvas.fractal(14.0, 4.0, 0.1, 0.8);
-  canvas.fractal(16.0, 0.08, 0.004, 0.9);
-  const int blades = static_cast<int>(350.0 * canvas.width() * canvas.height());
+  canvas.fractal(14.0, 0.08, 0.002, 0.95);
+  const int blades = static_cast<int>(1200.0 * canvas.width() * canvas.height());
   for (int i = 0; i < blades; ++i) {
     const double x = canvas.uniform(0.0, canvas.width());
     const double y = canvas.uniform(0.0, canvas.height());
@@ -367,14 +367,16 @@ void paint_grass(Canvas& canvas) {
 // Pebbles of many sizes, trodden earth.
 void paint_gravel(Canvas& canvas) {
   canvas.fill(120.0);
-  canvas.fractal(14.0, 3.0, 0.1, 0.8);
-  canvas.fractal(14.0, 0.08, 0.004, 0.9);
-  const int pebbles = static_cast<int>(250.0 * canvas.width() * canvas.height());
+  const int pebbles = static_cast<int>(900.0 * canvas.width() * canvas.height());
   for (int i = 0; i < pebbles; ++i) {
-    const double size = 0.006 + 0.04 * std::pow(canvas.uniform(0.0, 1.0), 4.0);
-    canvas.circle(canvas.uniform(0.0, canvas.width()), canvas.uniform(0.0, canvas.height()), size,
-                  canvas.uniform(60.0, 200.0));
+    const double size = 0.003 + 0.025 * std::pow(canvas.uniform(0.0, 1.0), 6.0);
+    const double x = canvas.uniform(0.0, canvas.width());
+    const double y = canvas.uniform(0.0, canvas.height());
+    canvas.circle(x + 0.3 * size, y + 0.3 * size, size, 60.0);  // its shadow
+    canvas.circle(x, y, size, canvas.uniform(70.0, 190.0));
   }
+  canvas.fractal(14.0, 3.0, 0.1, 0.8);
+  canvas.fractal(12.0, 0.08, 0.002, 0.95);
   scuffs(canvas, 30.0, 0.3, 50.0);
 }
 
@@ -439,9 +441,9 @@ Look look_of(Material material) {
     case Material::metal:
       return {0.0025, paint_metal};
     case Material::grass:
-      return {0.003, paint_grass};
+      return {0.002, paint_grass};
     case Material::gravel:
-      return {0.003, paint_gravel};
+      return {0.002, paint_gravel};
     case Material::foliage:
       return {0.005, paint_foliage};
     case Material::facade:

@@ -7,7 +7,7 @@
 namespace ear::simulator {
 namespace {
 
-constexpr double kTextureSize = 12.0;  // [m] of the ground, before it repeats
+constexpr double kTextureSize = 9.0;   // [m] of the ground, before it repeats
 constexpr double kSkyDistance = 70.0;  // [m] from the middle of the scene
 constexpr double kSkyHeight = 50.0;
 constexpr double kRoots = 0.5;  // [m] that things reach below the ground at their middle, or more on a slope
