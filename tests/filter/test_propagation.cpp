@@ -86,7 +86,7 @@ TEST_CASE("propagation: Q is the covariance of many noisy integrations") {
   std::vector<Eigen::Vector3d> gyro, accel;
   for (int i = 0; i < kSteps; ++i) {
     gyro.push_back(random_vector(rng, 1.0));
-    accel.push_back(random_vector(rng, 3.0) - kGravity_W);
+    accel.emplace_back(random_vector(rng, 3.0) - kGravity_W);
   }
   ErrorTransition total;
   ImuState mean = start;
