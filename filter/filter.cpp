@@ -16,8 +16,6 @@ constexpr double kStartGravityNoise =
     0.02;                             // [m/s^2] of the mean specific force of a standing vehicle with its rotors idling
 constexpr double kKnownSigma = 1e-6;  // [m, rad] of position and yaw at the start: by definition zero
 constexpr double kUnknownTilt = 0.3;  // [rad] before gravity was measured
-constexpr double kSceneDepth = 3.0;   // [m] what a standing vehicle may look at: image motion as a shift
-constexpr double kOnset = 0.1;        // [s] a shift that is seen came about in this time
 constexpr std::size_t kMinObservations = 2;  // clones that must have seen a feature
 
 int error_capacity(const FilterConfig& config) { return err::clone(config.window + 1); }
@@ -213,13 +211,7 @@ void Filter::advance(TimeNs t_ns) {
 /// The vehicle is where it was at the newest clone, and its velocity is zero. docs/filter.md, section 4.
 void Filter::hold_still() {
   statistics_.standing = true;
-  // The image moves a little when the vehicle is about to leave, or shakes on its legs: it is held as firmly as it
-  // stands.
-  const double turn = standstill_.flow_px() / focal_px_;
-  StandstillConfig still = config_.standstill;
-  still.rotation_sigma = std::hypot(still.rotation_sigma, turn);
-  still.position_sigma = std::hypot(still.position_sigma, turn * kSceneDepth);
-  still.velocity_sigma = std::hypot(still.velocity_sigma, turn * kSceneDepth / kOnset);
+  const StandstillConfig& still = config_.standstill;
   const ImuState& x = state_.imu;
   const Pose& held = state_.clones.back().T_WB;
   const int clone = err::clone(static_cast<int>(state_.clones.size()) - 1);

@@ -14,8 +14,7 @@ bool StandstillDetector::update(const FeatureFrame& frame, const ImuStatistics& 
   const bool imu_quiet = imu.duration > 0.8 * config_.duration && imu.gyro_spread < config_.max_gyro_spread &&
                          imu.accel_spread < config_.max_accel_spread && (imu.gyro_mean - gyro_bias).norm() < max_gyro;
   const double max_flow_px = standing_ ? config_.leave_flow_px : config_.max_flow_px;
-  if (imu_quiet && since_ns_ != kMoving) flow_px_ = common_flow_px(frame);
-  if (!imu_quiet || since_ns_ == kMoving || flow_px_ > max_flow_px) {
+  if (!imu_quiet || since_ns_ == kMoving || common_flow_px(frame) > max_flow_px) {
     restart(frame);
     return false;
   }

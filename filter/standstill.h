@@ -20,9 +20,6 @@ class StandstillDetector {
   /// [rad/s]: how far the mean rate may be from it. True if the vehicle has stood for config.duration.
   bool update(const FeatureFrame& frame, const ImuStatistics& imu, const Eigen::Vector3d& gyro_bias, double max_gyro);
 
-  /// How far the image has moved since the vehicle stopped [px]; after update() has returned true.
-  [[nodiscard]] double flow_px() const { return flow_px_; }
-
  private:
   static constexpr TimeNs kMoving = -1;
 
@@ -35,7 +32,6 @@ class StandstillDetector {
   StandstillConfig config_;
   double focal_px_;
   bool standing_ = false;
-  double flow_px_ = 0.0;
   TimeNs since_ns_ = kMoving;                  ///< first frame of the present stillness
   std::vector<FeatureObservation> reference_;  ///< features where they were then, by ascending id
   std::vector<FeatureObservation> renewed_;

@@ -11,7 +11,7 @@ struct StandstillConfig {
   double max_gyro_spread = 0.15;   ///< [rad/s] standard deviation of the samples over `duration`, vibration included
   double max_accel_spread = 3.0;   ///< [m/s^2] the same for the specific force
   double max_flow_px = 0.5;        ///< [px] common motion of the features until the vehicle is said to stand
-  double leave_flow_px = 1.5;      ///< [px] common motion since it stopped that ends it: legs give under rotors
+  double leave_flow_px = 1.0;      ///< [px] common motion since it stopped that ends it: legs give under rotors
   double position_sigma = 1e-3;    ///< [m] how far a standing vehicle may shift
   double rotation_sigma = 5e-4;    ///< [rad]
   double velocity_sigma = 5e-3;    ///< [m/s]
