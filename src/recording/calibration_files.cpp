@@ -158,8 +158,7 @@ void read_cameras(const fs::path& mav0, Calibration& calibration) {
     if (has_sensor(mav0, name)) calibration.cameras.push_back(read_camera(mav0 / name / "sensor.yaml"));
   }
   if (has_sensor(mav0, "cam0")) {  // an optional key beyond EuRoC's, under Kalibr's name
-    calibration.camera_time_offset =
-        YamlMap::load(mav0 / "cam0" / "sensor.yaml").get_or("timeshift_cam_imu", 0.0);
+    calibration.camera_time_offset = YamlMap::load(mav0 / "cam0" / "sensor.yaml").get_or("timeshift_cam_imu", 0.0);
   }
 }
 
