@@ -9,13 +9,12 @@
 namespace ear {
 namespace {
 
-constexpr std::size_t kImuCapacity = 4096;  // 20 s at 200 Hz, 4 s at 1 kHz
-constexpr double kHeldSample = 0.02;        // [s] so far the newest IMU sample may stand in for one that is missing
-constexpr double kGapNoiseFactor = 10.0;    // on the noise densities while a gap in the IMU data is bridged
-constexpr double kStartGravityNoise =
-    0.02;                             // [m/s^2] of the mean specific force of a standing vehicle with its rotors idling
-constexpr double kKnownSigma = 1e-6;  // [m, rad] of position and yaw at the start: by definition zero
-constexpr double kUnknownTilt = 0.3;  // [rad] before gravity was measured
+constexpr std::size_t kImuCapacity = 4096;   // 20 s at 200 Hz, 4 s at 1 kHz
+constexpr double kHeldSample = 0.02;         // [s] so far the newest IMU sample may stand in for one that is missing
+constexpr double kGapNoiseFactor = 10.0;     // on the noise densities while a gap in the IMU data is bridged
+constexpr double kStartGravityNoise = 0.02;  // [m/s^2] what idling rotors leave in the mean specific force
+constexpr double kKnownSigma = 1e-6;         // [m, rad] of position and yaw at the start: by definition zero
+constexpr double kUnknownTilt = 0.3;         // [rad] before gravity was measured
 constexpr std::size_t kMinObservations = 2;  // clones that must have seen a feature
 
 int error_capacity(const FilterConfig& config) { return err::clone(config.window + 1); }

@@ -9,21 +9,13 @@
 #include <string>
 #include <vector>
 
+#include "tests/simulator/support.h"
 #include "tools/simulator/constants.h"
 #include "tools/simulator/scene.h"
 #include "tools/simulator/simulation.h"
 
 namespace ear::simulator {
 namespace {
-
-Options ideal(const std::string& sequence, std::uint64_t seed) {
-  Options options;
-  options.sequence = sequence;
-  options.seed = seed;
-  options.sensor_noise = false;
-  options.tracks = false;
-  return options;
-}
 
 // How deep a disc's rim lies below the ground, by trying every point: independent of the simulator's contact solver.
 double deepest_by_search(const Terrain& terrain, const Eigen::Vector3d& centre_W, const Eigen::Vector3d& axle_W,

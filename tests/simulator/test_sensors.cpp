@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "tests/simulator/support.h"
 #include "tools/simulator/constants.h"
 #include "tools/simulator/sensors.h"
 #include "tools/simulator/simulation.h"
@@ -16,15 +17,6 @@
 
 namespace ear::simulator {
 namespace {
-
-Options ideal(const std::string& sequence, std::uint64_t seed) {
-  Options options;
-  options.sequence = sequence;
-  options.seed = seed;
-  options.sensor_noise = false;
-  options.tracks = false;
-  return options;
-}
 
 ear::Calibration vehicle() { return make_vehicle(30.0, ear::LensModel::radial_tangential); }
 
