@@ -6,6 +6,7 @@
 
 #include "filter/filter.h"
 #include "tests/support/simulated_run.h"
+#include "tools/experiments/sample_feed.h"
 #include "tools/simulator/simulation.h"
 
 using namespace ear;
@@ -31,15 +32,21 @@ double largest_error(const std::vector<EvaluatedEstimate>& run) {
 /// The same motion seen by somebody who switches on only after `start` seconds.
 std::size_t estimates_when_started_at(const simulator::Simulation& simulation, double start, double end) {
   Filter filter(FilterConfig{}, simulation.calibration());
+  struct LateStart {
+    Filter& filter;
+    TimeNs from;
+    void add_imu(const ImuSample& sample) {
+      if (sample.t_ns >= from) filter.add_imu(sample);
+    }
+  };
   const TimeNs first = simulation.frame_times().front();
+  LateStart receiver{filter, first + static_cast<TimeNs>(1e9 * start)};
+  experiments::SampleFeed feed(simulation);
   std::size_t estimates = 0;
-  std::size_t next_imu = 0;
   for (std::size_t i = 0; i < simulation.frame_times().size(); ++i) {
     const TimeNs t_ns = simulation.frame_times()[i];
+    feed.until_frame(t_ns, receiver);
     const double t = seconds_between(first, t_ns);
-    for (; next_imu < simulation.imu().size() && simulation.imu()[next_imu].t_ns < t_ns + 10'000'000; ++next_imu) {
-      if (t >= start) filter.add_imu(simulation.imu()[next_imu]);
-    }
     if (t >= start && t < end && filter.process(simulation.tracks(i))) ++estimates;
   }
   CHECK(filter.status() == (estimates > 0 ? Status::tracking : Status::waiting_for_standstill));
@@ -210,16 +217,19 @@ TEST_CASE("filter: wild observations do no harm") {
 TEST_CASE("filter: a hole in the inertial data is counted and survived") {
   const simulator::Simulation simulation = simulate("flat1", 15.0);
   Filter filter(FilterConfig{}, simulation.calibration());
-  const TimeNs start = simulation.imu().front().t_ns;
-  std::size_t next_imu = 0;
+  struct WithHole {
+    Filter& filter;
+    TimeNs start;
+    void add_imu(const ImuSample& sample) {
+      const double t = seconds_between(start, sample.t_ns);
+      if (t < 8.0 || t > 8.2) filter.add_imu(sample);
+    }
+  };
+  WithHole receiver{filter, simulation.imu().front().t_ns};
+  experiments::SampleFeed feed(simulation);
   std::optional<Estimate> estimate;
   for (std::size_t i = 0; i < simulation.frame_times().size(); ++i) {
-    for (; next_imu < simulation.imu().size() &&
-           simulation.imu()[next_imu].t_ns < simulation.frame_times()[i] + 10'000'000;
-         ++next_imu) {
-      const double t = seconds_between(start, simulation.imu()[next_imu].t_ns);
-      if (t < 8.0 || t > 8.2) filter.add_imu(simulation.imu()[next_imu]);
-    }
+    feed.until_frame(simulation.frame_times()[i], receiver);
     estimate = filter.process(simulation.tracks(i));
   }
   CHECK(filter.imu_counts().gaps == 1);

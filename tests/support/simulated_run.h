@@ -3,11 +3,11 @@
 
 #include <Eigen/Geometry>
 #include <cmath>
-#include <functional>
 #include <optional>
 #include <vector>
 
 #include "filter/filter.h"
+#include "tools/experiments/replay_simulation.h"
 #include "tools/simulator/simulation.h"
 
 namespace ear::test {
@@ -33,28 +33,20 @@ struct EvaluatedEstimate {
   Eigen::Vector3d dtheta_W;  ///< [rad]
 };
 
-/// Feeds inertial samples and tracks to the filter; `change` may alter a frame's features before they go in.
-inline std::vector<EvaluatedEstimate> run_filter(
-    Filter& filter, const simulator::Simulation& simulation,
-    const std::function<void(FeatureFrame&)>& change = [](FeatureFrame&) {}) {
+/// Feeds the simulation to the filter; `change` may alter a frame's features before they go in.
+inline std::vector<EvaluatedEstimate> run_filter(Filter& filter, const simulator::Simulation& simulation,
+                                                 const experiments::ChangeFrame& change = {}) {
   std::vector<EvaluatedEstimate> result;
   std::optional<WorldAlignment> world;
-  std::size_t next_imu = 0;
   const std::vector<TimeNs>& times = simulation.frame_times();
-  for (std::size_t i = 0; i < times.size(); ++i) {
-    while (next_imu < simulation.imu().size() && simulation.imu()[next_imu].t_ns < times[i] + 10'000'000) {
-      filter.add_imu(simulation.imu()[next_imu++]);
-    }
-    FeatureFrame frame = simulation.tracks(i);
-    change(frame);
-    const std::optional<Estimate> estimate = filter.process(frame);
-    if (!estimate) continue;
-    const NavState& x = estimate->state;
+  const auto compare = [&](std::size_t frame, const Estimate& estimate) {
+    const NavState& x = estimate.state;
     const simulator::Truth truth = simulation.truth(x.t_ns);
     if (!world) world.emplace(x, truth);
-    result.push_back({seconds_between(times.front(), times[i]), *estimate, world->R * truth.p_WB + world->p - x.p_WB,
+    result.push_back({seconds_between(times.front(), times[frame]), estimate, world->R * truth.p_WB + world->p - x.p_WB,
                       log_so3(world->R * truth.R_WB * x.q_WB.toRotationMatrix().transpose())});
-  }
+  };
+  experiments::replay(simulation, filter, compare, change);
   return result;
 }
 

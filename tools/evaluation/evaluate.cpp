@@ -143,6 +143,20 @@ StartToEnd start_to_end(const std::vector<Frame>& frames) {
   return result;
 }
 
+/// The frames whose ground the truth knows.
+std::vector<TerrainComparison> compare_terrain(const std::vector<Frame>& frames, const Estimate& estimate,
+                                               const std::vector<TerrainTruth>& terrain) {
+  std::vector<TerrainComparison> result;
+  for (const Frame& frame : frames) {
+    const std::optional<TerrainTruth> truth = terrain_at(terrain, frame.match.truth.t_ns);
+    if (!truth) continue;
+    TerrainComparison comparison{*truth, std::nullopt, frame.match.truth.p_WB.z() - frame.aligned.p_WB.z()};
+    if (!estimate.terrain.empty()) comparison.estimate = estimate.terrain[frame.match.index];
+    result.push_back(comparison);
+  }
+  return result;
+}
+
 /// All frames with their errors. `result.kind` is set.
 std::vector<Frame> compare_all(const Association& association, const Estimate& estimate, const Trajectory& truth,
                                const Eigen::Isometry3d& T_TE, AlignmentKind kind) {
@@ -202,7 +216,8 @@ std::vector<double> distance_travelled(const Trajectory& truth, const Trajectory
   return distances;
 }
 
-Evaluation evaluate(const Estimate& estimate, const Trajectory& truth, AlignmentKind kind) {
+Evaluation evaluate(const Estimate& estimate, const Trajectory& truth, AlignmentKind kind,
+                    const std::vector<TerrainTruth>& terrain) {
   const Association association = associate(estimate.poses, truth);
   require_overlap(association, estimate, truth);
   const Alignment alignment = align(kind, estimates_of(association, estimate), truths_of(association));
@@ -219,6 +234,7 @@ Evaluation evaluate(const Estimate& estimate, const Trajectory& truth, Alignment
   result.frames = compare_all(association, estimate, truth, alignment.T_TE, kind);
   summarize(result);
   if (!estimate.covariance.empty()) result.nees = summarize_nees(result.frames);
+  if (!terrain.empty()) result.terrain = terrain_figures(compare_terrain(result.frames, estimate, terrain));
   return result;
 }
 

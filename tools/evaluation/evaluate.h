@@ -8,6 +8,7 @@
 
 #include "tools/evaluation/alignment.h"
 #include "tools/evaluation/association.h"
+#include "tools/evaluation/terrain.h"
 #include "tools/evaluation/trajectory.h"
 
 namespace ear::evaluation {
@@ -70,7 +71,8 @@ struct Evaluation {
   double rotation_rmse = 0.0;            ///< [rad]
   std::vector<RelativeError> relative;   ///< 1, 5, 10 and 20 m, as far as the length allows
   StartToEnd start_to_end;
-  std::optional<Nees> nees;  ///< where the estimate has covariances
+  std::optional<Nees> nees;               ///< where the estimate has covariances
+  std::optional<TerrainFigures> terrain;  ///< where the truth knows the ground
   std::vector<Frame> frames;
 };
 
@@ -79,6 +81,8 @@ struct Evaluation {
 [[nodiscard]] std::vector<double> distance_travelled(const Trajectory& truth, const Trajectory& at);
 
 /// Throws std::runtime_error if fewer than two estimated poses have a truth.
-[[nodiscard]] Evaluation evaluate(const Estimate& estimate, const Trajectory& truth, AlignmentKind kind);
+/// `terrain` is what the truth knows of the ground, in time order; it may be empty.
+[[nodiscard]] Evaluation evaluate(const Estimate& estimate, const Trajectory& truth, AlignmentKind kind,
+                                  const std::vector<TerrainTruth>& terrain = {});
 
 }  // namespace ear::evaluation

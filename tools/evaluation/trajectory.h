@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -24,11 +25,32 @@ using Trajectory = std::vector<Pose>;
 /// of the estimate's world.
 using PoseCovariance = Eigen::Matrix<double, 6, 6>;
 
-/// One estimated trajectory. `covariance`, `mode` and `health` are empty, or have one entry per pose.
+/// The ground below the vehicle: uphill along the heading, and to the left of it, is positive [rad].
+struct Slope {
+  double along = 0.0;
+  double across = 0.0;
+};
+
+/// What a simulation knows of the ground at one instant; the slope also while the vehicle flies.
+struct TerrainTruth {
+  TimeNs t_ns = 0;
+  bool on_ground = true;
+  Slope slope;
+};
+
+/// What an estimate says of it.
+struct TerrainEstimate {
+  bool on_ground = false;
+  std::optional<Slope> slope;  ///< nothing where it knows none, as in the air
+  Slope sigma;                 ///< standard deviations of the slope
+};
+
+/// One estimated trajectory. All vectors but the poses are empty, or have one entry per pose.
 struct Estimate {
   std::string name;
   Trajectory poses;
   std::vector<PoseCovariance> covariance;
+  std::vector<TerrainEstimate> terrain;
   std::vector<std::string> mode;    ///< what the estimator says it does, as written in its file
   std::vector<std::string> health;  ///< how well it says it does it
 };

@@ -1,0 +1,96 @@
+#include "tools/experiments/figures.h"
+
+#include <cmath>
+
+#include "filter/filter.h"
+#include "tools/experiments/replay_simulation.h"
+#include "tools/experiments/simulation_truth.h"
+
+namespace ear::experiments {
+namespace {
+
+constexpr double kDegPerRad = 180.0 / M_PI;
+
+/// What is collected while the filter runs.
+struct Record {
+  evaluation::Estimate estimate;
+  double features_used = 0.0;
+  double features_rejected = 0.0;
+  bool finite = true;
+
+  void add(const Estimate& e) {
+    finite = finite && e.state.p_WB.allFinite() && e.state.q_WB.coeffs().allFinite() && e.covariance.allFinite();
+    if (!finite) return;
+    append(estimate, e);
+    features_used += e.frame.features_used;
+    features_rejected += e.frame.features_rejected;
+  }
+};
+
+void take_nees(const evaluation::Evaluation& evaluation, Figures& figures) {
+  double position = 0.0;
+  double orientation = 0.0;
+  double count = 0.0;
+  for (std::size_t i = evaluation.frames.size() / 2; i < evaluation.frames.size(); ++i) {
+    const evaluation::Frame& frame = evaluation.frames[i];
+    if (!frame.nees_position) continue;
+    position += *frame.nees_position;
+    orientation += *frame.nees_orientation;
+    count += 1.0;
+  }
+  if (count == 0.0) return;
+  figures.nees_position = position / count;
+  figures.nees_orientation = orientation / count;
+}
+
+void take_terrain(const evaluation::TerrainFigures& terrain, Figures& figures) {
+  figures.z_rmse_ground = terrain.z_rmse;
+  if (terrain.mode_agreement) figures.mode_agreement = 100.0 * *terrain.mode_agreement;
+  if (terrain.along) {
+    figures.slope_along_rmse = kDegPerRad * terrain.along->rmse;
+    figures.slope_along_inside = 100.0 * terrain.along->inside;
+  }
+  if (terrain.across) {
+    figures.slope_across_rmse = kDegPerRad * terrain.across->rmse;
+    figures.slope_across_inside = 100.0 * terrain.across->inside;
+  }
+}
+
+void take_errors(const evaluation::Evaluation& evaluation, Figures& figures) {
+  figures.length = evaluation.length;
+  figures.ate_rmse = evaluation.position_rmse;
+  if (evaluation.position_ratio) figures.ate_percent = 100.0 * *evaluation.position_ratio;
+  figures.z_rmse = evaluation.z_rmse;
+  figures.rotation_rmse = kDegPerRad * evaluation.rotation_rmse;
+  figures.start_to_end = evaluation.start_to_end.error;
+  take_nees(evaluation, figures);
+  if (evaluation.terrain) take_terrain(*evaluation.terrain, figures);
+}
+
+}  // namespace
+
+Figures measure(const simulator::Simulation& simulation, const Calibration& calibration, const FilterConfig& config,
+                evaluation::AlignmentKind alignment) {
+  Filter filter(config, calibration);
+  Record record;
+  replay(simulation, filter, [&](std::size_t, const Estimate& estimate) { record.add(estimate); });
+
+  Figures figures;
+  const evaluation::Estimate& estimate = record.estimate;
+  figures.coverage =
+      100.0 * static_cast<double>(estimate.poses.size()) / static_cast<double>(simulation.frame_times().size());
+  if (!record.finite || estimate.poses.size() < 2) return figures;
+
+  std::vector<TimeNs> times;
+  for (const evaluation::Pose& pose : estimate.poses) times.push_back(pose.t_ns);
+  const SimulationTruth truth = truth_of(simulation, times);
+  take_errors(evaluation::evaluate(estimate, truth.poses, alignment, truth.terrain), figures);
+  const evaluation::PoseCovariance& last = estimate.covariance.back();
+  figures.sigma_position = std::sqrt(last.topLeftCorner<3, 3>().trace());
+  figures.sigma_orientation = kDegPerRad * std::sqrt(last.bottomRightCorner<3, 3>().trace());
+  const double features = record.features_used + record.features_rejected;
+  if (features > 0.0) figures.features_rejected = 100.0 * record.features_rejected / features;
+  return figures;
+}
+
+}  // namespace ear::experiments

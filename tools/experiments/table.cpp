@@ -1,0 +1,170 @@
+#include "tools/experiments/table.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <numeric>
+#include <optional>
+#include <tuple>
+
+namespace ear::experiments {
+namespace {
+
+using Json = nlohmann::ordered_json;
+using Values = std::vector<double>;
+using Field = std::optional<double> Figures::*;
+
+double median(Values values) {
+  std::sort(values.begin(), values.end());
+  const std::size_t middle = values.size() / 2;
+  return values.size() % 2 == 1 ? values[middle] : 0.5 * (values[middle - 1] + values[middle]);
+}
+
+double mean(const Values& values) {
+  return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+}
+
+double worst(const Values& values) { return *std::max_element(values.begin(), values.end()); }
+
+struct NamedField {
+  const char* key;
+  Field field;
+};
+
+constexpr std::array<NamedField, 18> kFields{{
+    {"length_m", &Figures::length},
+    {"ate_rmse_m", &Figures::ate_rmse},
+    {"ate_percent", &Figures::ate_percent},
+    {"z_rmse_m", &Figures::z_rmse},
+    {"z_rmse_ground_m", &Figures::z_rmse_ground},
+    {"rotation_rmse_deg", &Figures::rotation_rmse},
+    {"start_to_end_m", &Figures::start_to_end},
+    {"nees_position", &Figures::nees_position},
+    {"nees_orientation", &Figures::nees_orientation},
+    {"sigma_position_m", &Figures::sigma_position},
+    {"sigma_orientation_deg", &Figures::sigma_orientation},
+    {"slope_along_rmse_deg", &Figures::slope_along_rmse},
+    {"slope_across_rmse_deg", &Figures::slope_across_rmse},
+    {"slope_along_inside_percent", &Figures::slope_along_inside},
+    {"slope_across_inside_percent", &Figures::slope_across_inside},
+    {"mode_agreement_percent", &Figures::mode_agreement},
+    {"coverage_percent", &Figures::coverage},
+    {"features_rejected_percent", &Figures::features_rejected},
+}};
+
+struct Column {
+  const char* label;
+  Field field;
+  double (*over_seeds)(const Values&);
+};
+
+double median_of(const Values& values) { return median(values); }
+
+constexpr std::array<Column, 20> kColumns{{
+    {"length [m]", &Figures::length, median_of},
+    {"ATE [m]", &Figures::ate_rmse, median_of},
+    {"worst", &Figures::ate_rmse, worst},
+    {"ATE [%]", &Figures::ate_percent, median_of},
+    {"worst", &Figures::ate_percent, worst},
+    {"z [m]", &Figures::z_rmse, median_of},
+    {"z on ground", &Figures::z_rmse_ground, median_of},
+    {"rotation [deg]", &Figures::rotation_rmse, median_of},
+    {"start-end [m]", &Figures::start_to_end, median_of},
+    {"sigma p [m]", &Figures::sigma_position, median_of},
+    {"sigma R [deg]", &Figures::sigma_orientation, median_of},
+    {"NEES p", &Figures::nees_position, mean},
+    {"NEES R", &Figures::nees_orientation, mean},
+    {"slope along [deg]", &Figures::slope_along_rmse, median_of},
+    {"in 3 sigma [%]", &Figures::slope_along_inside, mean},
+    {"slope across [deg]", &Figures::slope_across_rmse, median_of},
+    {"in 3 sigma [%]", &Figures::slope_across_inside, mean},
+    {"mode right [%]", &Figures::mode_agreement, mean},
+    {"coverage [%]", &Figures::coverage, mean},
+    {"rejected [%]", &Figures::features_rejected, mean},
+}};
+
+/// Three significant digits, whole numbers from 1000 on.
+std::string number_text(double value) {
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), std::abs(value) < 999.5 ? "%.3g" : "%.0f", value);
+  return text.data();
+}
+
+bool same(const Setup& a, const Setup& b) {
+  const auto tie = [](const Setup& s) { return std::tie(s.sequence, s.camera_rate_hz, s.true_calibration); };
+  return tie(a) == tie(b);
+}
+
+/// The runs of each setup.
+std::vector<std::vector<Run>> rows_of(const std::vector<Run>& runs) {
+  std::vector<std::vector<Run>> rows;
+  for (const Run& run : runs) {
+    const auto row =
+        std::find_if(rows.begin(), rows.end(), [&](const std::vector<Run>& r) { return same(r[0].setup, run.setup); });
+    if (row != rows.end()) {
+      row->push_back(run);
+    } else {
+      rows.push_back({run});
+    }
+  }
+  return rows;
+}
+
+Values values_of(const std::vector<Run>& runs, Field field) {
+  Values values;
+  for (const Run& run : runs) {
+    if (const std::optional<double>& value = run.figures.*field) values.push_back(*value);
+  }
+  return values;
+}
+
+const char* calibration_text(const Setup& setup) { return setup.true_calibration ? "true" : "wrong"; }
+
+}  // namespace
+
+std::string to_markdown(const std::vector<Run>& runs) {
+  std::vector<Column> columns;
+  std::copy_if(kColumns.begin(), kColumns.end(), std::back_inserter(columns),
+               [&](const Column& column) { return !values_of(runs, column.field).empty(); });
+
+  std::string text = "| sequence | Hz | calibration | seeds |";
+  std::string rule = "|---|---|---|---|";
+  for (const Column& column : columns) {
+    text += std::string(" ") + column.label + " |";
+    rule += "---|";
+  }
+  text += "\n" + rule + "\n";
+  for (const std::vector<Run>& row : rows_of(runs)) {
+    const Setup& setup = row.front().setup;
+    const std::size_t estimated = values_of(row, &Figures::ate_rmse).size();
+    text += "| " + setup.sequence + " | " + number_text(setup.camera_rate_hz) + " | " + calibration_text(setup) + " | ";
+    text += (estimated < row.size() ? std::to_string(estimated) + " of " : "") + std::to_string(row.size()) + " |";
+    for (const Column& column : columns) {
+      const Values values = values_of(row, column.field);
+      text += values.empty() ? " - |" : " " + number_text(column.over_seeds(values)) + " |";
+    }
+    text += "\n";
+  }
+  return text;
+}
+
+std::string to_json(const std::vector<Run>& runs) {
+  Json list = Json::array();
+  for (const Run& run : runs) {
+    Json item{{"sequence", run.setup.sequence},
+              {"camera_rate_hz", run.setup.camera_rate_hz},
+              {"calibration", calibration_text(run.setup)},
+              {"seed", run.seed}};
+    for (const NamedField& field : kFields) {
+      const std::optional<double>& value = run.figures.*field.field;
+      item[field.key] = value ? Json(*value) : Json(nullptr);
+    }
+    list.push_back(item);
+  }
+  return list.dump(2) + "\n";
+}
+
+}  // namespace ear::experiments
