@@ -6,9 +6,11 @@
 #include <optional>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "tools/commands.h"
 #include "tools/progress.h"
+#include "tools/simulator/faults.h"
 #include "tools/simulator/recording_writer.h"
 #include "tools/simulator/sequence.h"
 #include "tools/simulator/simulation.h"
@@ -18,6 +20,7 @@ namespace {
 
 struct SimulateArguments {
   simulator::Options options;
+  std::vector<std::string> faults;
   std::filesystem::path out;
   bool no_images = false;
   std::filesystem::path images_from;
@@ -27,6 +30,7 @@ struct SimulateArguments {
 void simulate(const SimulateArguments& args) {
   simulator::Options options = args.options;
   options.tracks = false;
+  for (const std::string& fault : args.faults) options.faults.push_back(simulator::parse_fault(fault));
   const simulator::Simulation simulation(options);
   if (!args.images_from.empty()) simulator::require_same_pictures(simulation, args.images_from);
   simulator::write_recording(simulation, args.out);
@@ -42,8 +46,8 @@ void simulate(const SimulateArguments& args) {
   }
   std::printf("%s: %s seed %llu, %.1f s, %.1f m, %zu stereo frames%s\n", args.out.c_str(), options.sequence.c_str(),
               static_cast<unsigned long long>(options.seed),
-              seconds_between(simulation.imu().front().t_ns, simulation.imu().back().t_ns), simulation.path_length(),
-              simulation.frame_times().size(), args.no_images ? " (without images)" : "");
+              seconds_between(simulation.truth_times().front(), simulation.truth_times().back()),
+              simulation.path_length(), simulation.frame_times().size(), args.no_images ? " (without images)" : "");
 }
 
 std::string list_of_sequences() {
@@ -59,7 +63,7 @@ std::string list_of_sequences() {
 void add_simulate_command(CLI::App& app) {
   const auto args = std::make_shared<SimulateArguments>();
   CLI::App* command = app.add_subcommand("simulate", "write a recording of a simulated vehicle, with its truth");
-  command->footer(list_of_sequences());
+  command->footer(list_of_sequences() + "\n\n" + simulator::fault_help());
   command->add_option("sequence", args->options.sequence, "what it does (below)")->required();
   command->add_option("--out", args->out, "folder of the recording; must not hold one yet")->required();
   command->add_option("--seed", args->options.seed, "varies noise, textures and details of the motion")
@@ -68,6 +72,7 @@ void add_simulate_command(CLI::App& app) {
   command->add_option("--camera-rate", args->options.camera_rate_hz, "[Hz]")->capture_default_str();
   command->add_flag("--perfect-calibration", args->options.perfect_calibration,
                     "write the true calibration instead of a slightly wrong one; all else stays the same");
+  command->add_option("--fault", args->faults, "what goes wrong, as NAME@START+DURATION (below); may be repeated");
   CLI::Option* no_images = command->add_flag("--no-images", args->no_images, "everything but the pictures");
   command->add_option("--images-from", args->images_from, "link the pictures of this recording of the same simulation")
       ->excludes(no_images);

@@ -134,6 +134,30 @@ TEST_CASE("recording: what is there already is not mixed with something else") {
                        std::runtime_error);
 }
 
+TEST_CASE("recording: faults are listed, and the reader survives a clock that jumps") {
+  const TemporaryFolder folder;
+  Options options = short_drive(47);
+  options.duration = 4.0;
+  write_recording(Simulation(options), folder / "clean");
+  options.faults = {parse_fault("laser_biased.rear@1.5+2=0.1"), parse_fault("clock_jump.imu@2+1"),
+                    parse_fault("imu_gap@3.5+0.2")};
+  const Simulation simulation(options);
+  write_recording(simulation, folder / "r");
+  CHECK(lines_of(folder / "clean/mav0/faults.csv").size() == 1);
+  const std::vector<std::string> lines = lines_of(folder / "r/mav0/faults.csv");
+  REQUIRE(lines.size() == 4);
+  CHECK(lines[1] == "laser_biased,rear,1600000001500000000,1600000003500000000,0.1");
+  CHECK(lines[3] == "imu_gap,,1600000003500000000,1600000003700000000,0");
+  const std::string truth = "mav0/state_groundtruth_estimate0/data.csv";
+  CHECK(bytes_of(folder / "r" / truth) == bytes_of(folder / "clean" / truth));
+
+  ear::Recording recording(folder / "r");
+  std::size_t imu = 0;
+  while (const auto sample = recording.next()) imu += std::holds_alternative<ear::ImuSample>(*sample) ? 1 : 0;
+  // The clock goes back by 20 samples: no stamp may come twice or run backward.
+  CHECK(imu == simulation.imu().size() - 20);
+}
+
 TEST_CASE("recording: pictures do not depend on the threads, and serve the other calibration, too") {
   const TemporaryFolder folder;
   Options options = short_drive(45);

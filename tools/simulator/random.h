@@ -22,7 +22,8 @@ enum class Stream : std::uint32_t {
   exposure = 8,
   pixels = 9,
   laser_faults = 10,
-  obstruction = 11
+  obstruction = 11,
+  faults = 12
 };
 
 [[nodiscard]] inline Rng make_rng(std::uint64_t seed, Stream stream) {

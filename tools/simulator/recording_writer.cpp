@@ -84,7 +84,9 @@ void write_camera(const Simulation& simulation, const fs::path& folder, std::siz
 
   TextFile csv(folder / "data.csv");
   csv.print("#timestamp [ns],filename\n");
-  for (const TimeNs t_ns : simulation.frame_times()) csv.print("%lld,%lld.png\n", number(t_ns), number(t_ns));
+  for (const Frame& frame : simulation.frames()) {
+    csv.print("%lld,%lld.png\n", number(frame.t_ns), number(frame.taken_ns));
+  }
   csv.close();
 }
 
@@ -167,8 +169,8 @@ void write_truth(const Simulation& simulation, const fs::path& mav0) {
       "b_w_x [rad/s],b_w_y [rad/s],b_w_z [rad/s],b_a_x [m/s^2],b_a_y [m/s^2],b_a_z [m/s^2]\n");
   extra.print(
       "#timestamp [ns],mode [0 ground 1 air],slope_along [rad],slope_across [rad],axle_speed [m/s],slip [m/s]\n");
-  for (const ImuSample& sample : simulation.imu()) {
-    const Truth truth = simulation.truth(sample.t_ns);
+  for (const TimeNs t_ns : simulation.truth_times()) {
+    const Truth truth = simulation.truth(t_ns);
     Eigen::Quaterniond q_WB(truth.R_WB);
     if (q_WB.w() < 0.0) q_WB.coeffs() *= -1.0;
     csv.print("%lld,%.9f,%.9f,%.9f,%.12f,%.12f,%.12f,%.12f,%.9f,%.9f,%.9f,%.9f,%.9f,%.9f,%.9f,%.9f,%.9f\n",
@@ -180,6 +182,19 @@ void write_truth(const Simulation& simulation, const fs::path& mav0) {
   }
   csv.close();
   extra.close();
+}
+
+// When what goes wrong.
+void write_faults(const Simulation& simulation, const fs::path& mav0) {
+  TextFile csv(mav0 / "faults.csv");
+  csv.print("#fault,target,start [ns],end [ns],parameter\n");
+  for (const Fault& fault : simulation.options().faults) {
+    const FaultType type = type_of(fault.kind);
+    const auto time = [](double seconds) { return number(kStart + std::llround(1e9 * seconds)); };
+    csv.print("%s,%s,%lld,%lld,%g\n", type.name, type.targets.empty() ? "" : type.targets[fault.target].c_str(),
+              time(fault.start), time(fault.end()), fault.parameter);
+  }
+  csv.close();
 }
 
 // What pictures depend on, one key per line. Recordings that agree here may share their pictures.
@@ -199,6 +214,8 @@ void write_origin(const Simulation& simulation, const fs::path& directory) {
   yaml.print("# What made this recording. The first lines decide which pictures it can share with another one.\n");
   for (const std::string& line : picture_origin(simulation)) yaml.print("%s\n", line.c_str());
   yaml.print("perfect_calibration: %s\n", simulation.options().perfect_calibration ? "true" : "false");
+  yaml.print("faults:%s\n", simulation.options().faults.empty() ? " []" : "");
+  for (const Fault& fault : simulation.options().faults) yaml.print("  - %s\n", to_string(fault).c_str());
   yaml.close();
 }
 
@@ -214,11 +231,12 @@ void write_recording(const Simulation& simulation, const fs::path& directory) {
   write_encoder(simulation, mav0 / "encoder0");
   write_lasers(simulation, mav0 / "laser0");
   write_truth(simulation, mav0);
+  write_faults(simulation, mav0);
   write_origin(simulation, directory);
 }
 
-fs::path image_path(const fs::path& directory, std::size_t camera, TimeNs t_ns) {
-  return directory / "mav0" / ("cam" + std::to_string(camera)) / "data" / (std::to_string(t_ns) + ".png");
+fs::path image_path(const fs::path& directory, std::size_t camera, TimeNs taken_ns) {
+  return directory / "mav0" / ("cam" + std::to_string(camera)) / "data" / (std::to_string(taken_ns) + ".png");
 }
 
 void render_images(const Simulation& simulation, const fs::path& directory, int threads, const Progress& progress) {
@@ -226,8 +244,8 @@ void render_images(const Simulation& simulation, const fs::path& directory, int 
   const std::vector<CameraCalibration>& cameras = simulation.true_calibration().cameras;
   const Renderer renderer(simulation.scene(), appearance, cameras);
   const ImageSensor sensor;
-  const std::vector<TimeNs>& times = simulation.frame_times();
-  const std::size_t total = times.size() * cameras.size();
+  const std::vector<Frame>& frames = simulation.frames();
+  const std::size_t total = frames.size() * cameras.size();
   for (std::size_t camera = 0; camera < cameras.size(); ++camera) {
     fs::create_directories(image_path(directory, camera, 0).parent_path());
   }
@@ -235,17 +253,18 @@ void render_images(const Simulation& simulation, const fs::path& directory, int 
   // Level 1 with run lengths: noise does not compress, and the encoder must not cost more than the picture.
   const std::vector<int> png{cv::IMWRITE_PNG_COMPRESSION, 1, cv::IMWRITE_PNG_STRATEGY, cv::IMWRITE_PNG_STRATEGY_RLE};
   const auto make_picture = [&](std::size_t index) {
-    const TimeNs t_ns = times[index / cameras.size()];
+    const Frame& frame = frames[index / cameras.size()];
     const std::size_t camera = index % cameras.size();
-    const double t = motion_time(t_ns);
+    const double t = motion_time(frame.taken_ns);
     const Obstruction& obstruction = simulation.obstruction();
     cv::Mat grey(cameras[camera].height, cameras[camera].width, CV_32FC1, cv::Scalar(0.0));
     if (!obstruction.covered(t)) {
       grey = renderer.render(camera, simulation.plan().trajectory, t, exposure_at(t, simulation.options().seed));
     }
     draw_obstruction(obstruction, cameras[camera], camera, t, grey);
-    const fs::path path = image_path(directory, camera, t_ns);
-    if (!cv::imwrite(path.string(), sensor.read(grey, picture_key(simulation.options().seed, t_ns, camera)), png)) {
+    const fs::path path = image_path(directory, camera, frame.taken_ns);
+    if (!cv::imwrite(path.string(), sensor.read(grey, picture_key(simulation.options().seed, frame.taken_ns, camera)),
+                     png)) {
       throw std::runtime_error(path.string() + ": cannot be written");
     }
   };
@@ -293,9 +312,9 @@ void require_same_pictures(const Simulation& simulation, const fs::path& other) 
 void link_images(const Simulation& simulation, const fs::path& directory, const fs::path& other) {
   for (std::size_t camera = 0; camera < simulation.calibration().cameras.size(); ++camera) {
     fs::create_directories(image_path(directory, camera, 0).parent_path());
-    for (const TimeNs t_ns : simulation.frame_times()) {
-      const fs::path from = image_path(other, camera, t_ns);
-      const fs::path to = image_path(directory, camera, t_ns);
+    for (const Frame& frame : simulation.frames()) {
+      const fs::path from = image_path(other, camera, frame.taken_ns);
+      const fs::path to = image_path(directory, camera, frame.taken_ns);
       std::error_code cannot_link;
       fs::create_hard_link(from, to, cannot_link);
       if (cannot_link) fs::copy_file(from, to);

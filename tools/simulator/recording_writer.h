@@ -10,13 +10,14 @@
 
 namespace ear::simulator {
 
-/// Writes everything but the pictures: csv files, sensor.yaml files with the calibration told, truth, truth_extra.csv
-/// and simulation.yaml, which says what made it. Throws std::runtime_error, naming the file, if it cannot write or if
-/// `directory` already holds a recording.
+/// Writes everything but the pictures: csv files, sensor.yaml files with the calibration told, truth, truth_extra.csv,
+/// faults.csv and simulation.yaml, which says what made it. Throws std::runtime_error, naming the file, if it cannot
+/// write or if `directory` already holds a recording.
 void write_recording(const Simulation& simulation, const std::filesystem::path& directory);
 
-/// Where the picture of one camera at one time belongs.
-[[nodiscard]] std::filesystem::path image_path(const std::filesystem::path& directory, std::size_t camera, TimeNs t_ns);
+/// Where the picture that one camera takes at one time belongs.
+[[nodiscard]] std::filesystem::path image_path(const std::filesystem::path& directory, std::size_t camera,
+                                               TimeNs taken_ns);
 
 /// Is told how many of all pictures are there; called from any thread, one at a time.
 using Progress = std::function<void(std::size_t done, std::size_t total)>;

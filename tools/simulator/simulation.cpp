@@ -5,6 +5,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "tools/simulator/sensor_faults.h"
 #include "tools/simulator/sequence.h"
 #include "tools/simulator/vehicle.h"
 
@@ -20,7 +21,17 @@ constexpr double kCameraPhase = 0.1083;
 Options checked(const Options& options) {
   if (!(options.camera_rate_hz > 0.0)) throw std::invalid_argument("the camera rate must be positive");
   if (options.duration && !(*options.duration > 0.0)) throw std::invalid_argument("the duration must be positive");
+  for (const Fault& fault : options.faults) require_valid(fault);
   return options;
+}
+
+void require_within(const std::vector<Fault>& faults, double end) {
+  for (const Fault& fault : faults) {
+    if (!fault.begun(end)) {
+      throw std::invalid_argument("fault '" + to_string(fault) + "': the recording ends at " + std::to_string(end) +
+                                  " s");
+    }
+  }
 }
 
 Sequence varied_sequence(const Options& options) {
@@ -68,32 +79,40 @@ Simulation::Simulation(const Options& options, const Sequence& sequence)
       scene_(make_scene(sequence.place, sequence.terrain)),
       plan_(planned(options, sequence, *true_calibration_.encoder)),
       wheels_(plan_, sequence.terrain, *true_calibration_.encoder),
+      wheel_faults_(options.faults, plan_, wheels_, *true_calibration_.encoder),
       obstruction_(drawn_obstruction(options, sequence, plan_.trajectory.duration())),
       duration_(options.duration.value_or(plan_.trajectory.duration() - 0.2)) {
   const double end = kImuPhase + duration_;
+  require_within(options.faults, end);
   const Calibration sensors = sensors_of(options, true_calibration_);
   const Trajectory& trajectory = plan_.trajectory;
 
   Rng imu_rng = make_rng(options.seed, Stream::imu);
-  const std::vector<TimeNs> imu_stamps = regular_stamps(sensors.imu.rate_hz, kImuPhase, end);
-  imu_ = ideal_imu(trajectory, imu_stamps, sensors.imu.rate_hz);
-  biases_.assign(imu_stamps.size(), ImuBias{});
+  truth_times_ = regular_stamps(sensors.imu.rate_hz, kImuPhase, end);
+  imu_ = ideal_imu(trajectory, truth_times_, sensors.imu.rate_hz);
+  biases_.assign(truth_times_.size(), ImuBias{});
   if (options.sensor_noise) {
-    biases_ = draw_imu_biases(sensors.imu, imu_stamps.size(), imu_rng);
+    biases_ = draw_imu_biases(sensors.imu, truth_times_.size(), imu_rng);
     corrupt_imu(imu_, sensors.imu, biases_, imu_rng);
   }
+  fault_imu(imu_, biases_, options.faults, options.seed);
+  fault_clock(imu_, options.faults, ClockedStream::imu);
 
   Rng encoder_rng = make_rng(options.seed, Stream::encoder);
   encoders_ = read_encoders(wheels_, *sensors.encoder, regular_stamps(sensors.encoder->rate_hz, kEncoderPhase, end),
                             encoder_rng);
+  fault_encoders(encoders_, *sensors.encoder, wheel_faults_, options.faults);
+  fault_clock(encoders_, options.faults, ClockedStream::encoder);
 
   Rng laser_rng = make_rng(options.seed, Stream::laser);
   lasers_ = read_lasers(trajectory, sequence.terrain, *sensors.lasers,
                         regular_stamps(sensors.lasers->rate_hz, kLaserPhase, end), laser_rng);
   if (options.sensor_noise) {
-    Rng fault_rng = make_rng(options.seed, Stream::laser_faults);
-    corrupt_lasers(lasers_, *sensors.lasers, sequence.laser_faults, fault_rng);
+    Rng laser_fault_rng = make_rng(options.seed, Stream::laser_faults);
+    corrupt_lasers(lasers_, *sensors.lasers, sequence.laser_faults, laser_fault_rng);
   }
+  fault_lasers(lasers_, *sensors.lasers, options.faults);
+  fault_clock(lasers_, options.faults, ClockedStream::laser);
 
   frame_times_ = regular_stamps(options.camera_rate_hz, kCameraPhase, end);
   if (options.tracks) {
@@ -101,6 +120,12 @@ Simulation::Simulation(const Options& options, const Sequence& sequence)
     tracks_ =
         generate_tracks(scene_, trajectory, sensors.cameras, frame_times_, obstruction_, options.track, track_rng);
   }
+  for (TimeNs& t_ns : frame_times_) {
+    const TimeNs taken_ns = t_ns;
+    t_ns += clock_error(options.faults, ClockedStream::camera, taken_ns);
+    frames_.push_back({t_ns, taken_ns});
+  }
+  fault_clock(tracks_, options.faults, ClockedStream::camera);
 }
 
 Truth Simulation::truth(TimeNs t_ns) const {
@@ -113,7 +138,7 @@ Truth Simulation::truth(TimeNs t_ns) const {
   truth.v_W = motion.v_W;
   truth.omega_B = motion.omega_B;
 
-  const double position = std::clamp(seconds_between(imu_.front().t_ns, t_ns) * true_calibration_.imu.rate_hz, 0.0,
+  const double position = std::clamp(seconds_between(truth_times_.front(), t_ns) * true_calibration_.imu.rate_hz, 0.0,
                                      static_cast<double>(biases_.size() - 1));
   const auto before = static_cast<std::size_t>(position);
   const std::size_t after = std::min(before + 1, biases_.size() - 1);
@@ -130,15 +155,15 @@ Truth Simulation::truth(TimeNs t_ns) const {
   truth.slope_along = std::asin(forward_W.z());
   truth.slope_across = std::asin(left_W.z());
   truth.axle_speed = forward_W.dot(motion.v_O_W);
-  truth.slip = wheels_.slip(t);
+  truth.slip = wheels_.slip(t) + wheel_faults_.slip(t);
   return truth;
 }
 
 double Simulation::path_length() const {
   double length = 0.0;
-  for (std::size_t i = 1; i < imu_.size(); ++i) {
-    const Eigen::Vector3d before = plan_.trajectory.at(motion_time(imu_[i - 1].t_ns)).p_WB;
-    length += (plan_.trajectory.at(motion_time(imu_[i].t_ns)).p_WB - before).norm();
+  for (std::size_t i = 1; i < truth_times_.size(); ++i) {
+    const Eigen::Vector3d before = plan_.trajectory.at(motion_time(truth_times_[i - 1])).p_WB;
+    length += (plan_.trajectory.at(motion_time(truth_times_[i])).p_WB - before).norm();
   }
   return length;
 }

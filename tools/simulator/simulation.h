@@ -13,11 +13,13 @@
 
 #include "ear/calibration.h"
 #include "ear/types.h"
+#include "tools/simulator/faults.h"
 #include "tools/simulator/motion_plan.h"
 #include "tools/simulator/obstruction.h"
 #include "tools/simulator/scene.h"
 #include "tools/simulator/sensors.h"
 #include "tools/simulator/track_generator.h"
+#include "tools/simulator/wheel_faults.h"
 #include "tools/simulator/wheel_motion.h"
 
 namespace ear::simulator {
@@ -32,6 +34,7 @@ struct Options {
   bool sensor_noise = true;  ///< false: IMU without noise and biases, encoders and lasers without noise and faults
   bool tracks = true;        ///< false: no feature tracks, for recordings of images
   TrackOptions track;
+  std::vector<Fault> faults = {};  ///< what else goes wrong; all that they do not hit stays, sample for sample
 };
 
 /// The truth at one instant. World W: z up, the origin in a corner of the room.
@@ -51,23 +54,35 @@ struct Truth {
   double slip = 0.0;                               ///< speed of the rims over the ground, mean of both wheels [m/s]
 };
 
+/// One stereo frame as it is delivered.
+struct Frame {
+  TimeNs t_ns = 0;      ///< its stamp
+  TimeNs taken_ns = 0;  ///< the middle of its exposure: the same, unless the camera's clock jumps
+};
+
 class Simulation {
  public:
-  /// Throws std::invalid_argument for a sequence that does not exist or a duration or rate that is not positive.
+  /// Throws std::invalid_argument for a sequence that does not exist, a duration or rate that is not positive, or a
+  /// fault that cannot be.
   explicit Simulation(const Options& options);
 
   /// What the estimator is told; slightly wrong unless Options::perfect_calibration.
   [[nodiscard]] const Calibration& calibration() const { return calibration_; }
   [[nodiscard]] const Calibration& true_calibration() const { return true_calibration_; }
 
+  /// At any time of the motion, true time: a clock that jumps does not change it.
   [[nodiscard]] Truth truth(TimeNs t_ns) const;
+  /// Where truth is recorded: the true times of all IMU samples, also of those that a fault takes away.
+  [[nodiscard]] const std::vector<TimeNs>& truth_times() const { return truth_times_; }
   /// Distance that the body travels from the first to the last stamp [m].
   [[nodiscard]] double path_length() const;
 
+  /// Samples in the order in which they arrive.
   [[nodiscard]] const std::vector<ImuSample>& imu() const { return imu_; }
   [[nodiscard]] const std::vector<EncoderSample>& encoders() const { return encoders_; }
   [[nodiscard]] const std::vector<LaserSample>& lasers() const { return lasers_; }
-  /// Stamps of the stereo frames: the middle of their exposure.
+  [[nodiscard]] const std::vector<Frame>& frames() const { return frames_; }
+  /// Stamps of the stereo frames.
   [[nodiscard]] const std::vector<TimeNs>& frame_times() const { return frame_times_; }
   /// Features of one frame. Throws std::out_of_range; without Options::tracks there are none.
   [[nodiscard]] const FeatureFrame& tracks(std::size_t frame) const { return tracks_.at(frame); }
@@ -87,13 +102,16 @@ class Simulation {
   Scene scene_;
   MotionPlan plan_;
   WheelMotion wheels_;
+  WheelFaults wheel_faults_;
   Obstruction obstruction_;
   double duration_;
+  std::vector<TimeNs> truth_times_;
   std::vector<ImuSample> imu_;
-  std::vector<ImuBias> biases_;  // at the stamps of imu_
+  std::vector<ImuBias> biases_;  // at truth_times_
   std::vector<EncoderSample> encoders_;
   std::vector<LaserSample> lasers_;
-  std::vector<TimeNs> frame_times_;
+  std::vector<Frame> frames_;
+  std::vector<TimeNs> frame_times_;  // of frames_
   std::vector<FeatureFrame> tracks_;
 };
 
