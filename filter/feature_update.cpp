@@ -1,7 +1,6 @@
 #include "filter/feature_update.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/LU>
 #include <algorithm>
 #include <cassert>
 #include <cmath>
@@ -14,6 +13,30 @@ constexpr double kNegligiblePivot = 1e-11;  // of the sum before projection: rou
 
 /// First column of a clone, counted from err::camera.
 constexpr int clone_column(int clone) { return err::clone(clone) - err::camera; }
+
+/// The rows of which A = H^T H and b = H^T r are the sums: Cholesky, A = U^T U, gives U and U^-T b. A, of which only
+/// the lower triangle is read, is singular (yaw and position are free, calibration is seen in part): a pivot lost in
+/// rounding, against `scale`, says nothing, and its row is left out. A and b are overwritten.
+void rows_from_sums(Eigen::Ref<Eigen::MatrixXd> A, Eigen::Ref<Eigen::VectorXd> b, const Eigen::VectorXd& scale,
+                    WhitenedRows& rows) {
+  const int size = static_cast<int>(b.size());
+  rows.count = 0;
+  for (int j = 0; j < size; ++j) {
+    const double pivot = A(j, j);
+    if (pivot <= kNegligiblePivot * scale(j)) continue;
+    const int rest = size - j - 1;
+    const double root = std::sqrt(pivot);
+    auto u = A.col(j).tail(rest);
+    u /= root;
+    rows.H.row(rows.count).head(j).setZero();
+    rows.H(rows.count, j) = root;
+    rows.H.row(rows.count).segment(j + 1, rest) = u.transpose();
+    rows.r(rows.count) = b(j) / root;
+    b.tail(rest) -= rows.r(rows.count) * u;
+    A.bottomRightCorner(rest, rest).selfadjointView<Eigen::Lower>().rankUpdate(u, -1.0);
+    ++rows.count;
+  }
+}
 
 }  // namespace
 
@@ -70,22 +93,21 @@ LinearizedObservation linearize_observation(const State& x, int clone, int camer
 
 FeatureInformation::FeatureInformation(int max_clones, int max_features) {
   const int size = err::clone(max_clones) - err::camera;
-  A_.resize(size, size);
-  H_.resize(size, size);
+  for (Eigen::MatrixXd* const matrix : {&A_, &feature_A_, &gate_A_, &gate_PHt_, &rows_.H, &gate_rows_.H}) {
+    matrix->resize(size, size);
+  }
+  for (Eigen::VectorXd* const vector : {&b_, &feature_b_, &gate_b_, &scale_, &rows_.r, &gate_rows_.r}) {
+    vector->resize(size);
+  }
   W_.resize(size, 3 * max_features);
-  b_.resize(size);
-  r_.resize(size);
-  feature_A_.resize(size, size);
-  feature_b_.resize(size);
-  gate_A_.resize(size, size);
-  gate_M_.resize(size, size);
+  weights_.reserve(2 * static_cast<std::size_t>(max_clones));
 }
 
 void FeatureInformation::start(int error_size) {
   size_ = error_size - err::camera;
   assert(size_ <= A_.rows());
   features_ = 0;
-  rows_ = 0;
+  rows_.count = 0;
   A_.topLeftCorner(size_, size_).setZero();
   b_.head(size_).setZero();
 }
@@ -94,18 +116,15 @@ bool FeatureInformation::add_gated(const std::vector<LinearizedObservation>& obs
                                    const Eigen::Ref<const Eigen::MatrixXd>& P, double threshold) {
   if (3 * (features_ + 1) > W_.cols()) return false;
 
-  // Huber weights, and with them whitening.
-  const auto weight = [&](const LinearizedObservation& z) {
-    const double distance = z.residual.norm() / sigma;
-    return (distance > huber ? huber / distance : 1.0) / (sigma * sigma);
-  };
-
   // The feature's own block first: it alone decides, most of the time, about the gate.
   Eigen::Matrix3d V = Eigen::Matrix3d::Zero();
   Eigen::Vector3d v = Eigen::Vector3d::Zero();
   double cost = 0.0;
+  weights_.clear();
   for (const LinearizedObservation& z : observations) {
-    const double w = weight(z);
+    const double distance = z.residual.norm() / sigma;
+    const double w = (distance > huber ? huber / distance : 1.0) / (sigma * sigma);  // Huber's, and whitening
+    weights_.push_back(w);
     V.noalias() += w * z.H_f.transpose() * z.H_f;
     v.noalias() += w * z.H_f.transpose() * z.residual;
     cost += w * z.residual.squaredNorm();
@@ -119,8 +138,9 @@ bool FeatureInformation::add_gated(const std::vector<LinearizedObservation>& obs
   feature_b_.head(size_).setZero();
   auto W = W_.block(0, 3 * features_, size_, 3);
   W.setZero();
-  for (const LinearizedObservation& z : observations) {
-    const double w = weight(z);
+  for (std::size_t i = 0; i < observations.size(); ++i) {
+    const LinearizedObservation& z = observations[i];
+    const double w = weights_[i];
     const int at = clone_column(z.clone);
     const Eigen::Matrix<double, kCalibration, 2> Hw_cal = w * z.H_calibration.transpose();
     const Eigen::Matrix<double, err::clone_size, 2> Hw_clone = w * z.H_clone.transpose();
@@ -137,54 +157,45 @@ bool FeatureInformation::add_gated(const std::vector<LinearizedObservation>& obs
 
   // With P = 0 the statistic is largest: who passes then passes anyway, and the full test is not needed.
   const double residual_cost = cost - Lv.squaredNorm();
-  if (residual_cost > threshold) {
-    auto A = gate_A_.topLeftCorner(size_, size_);
-    A = feature_A_.topLeftCorner(size_, size_).selfadjointView<Eigen::Lower>();
-    A.noalias() -= W * W.transpose();
-    if (chi_squared(P, residual_cost) > threshold) return false;
-  }
+  if (residual_cost > threshold && chi_squared(P, residual_cost) > threshold) return false;
   A_.topLeftCorner(size_, size_).triangularView<Eigen::Lower>() += feature_A_.topLeftCorner(size_, size_);
   b_.head(size_) += feature_b_.head(size_);
   ++features_;
   return true;
 }
 
-/// r^T (H P H^T + I)^-1 r = r^T r - b^T P (I + A P)^-1 b over the camera's part, by the matrix inversion lemma.
+/// r^T (H P H^T + I)^-1 r over all rows of the feature at hand, the last in W_. `residual_cost`: r^T r. What the
+/// projected rows do not show of r is noise alone.
 double FeatureInformation::chi_squared(const Eigen::Ref<const Eigen::MatrixXd>& P, double residual_cost) {
-  const auto P_cc = P.block(err::camera, err::camera, size_, size_);
-  auto M = gate_M_.topLeftCorner(size_, size_);
-  M.noalias() = gate_A_.topLeftCorner(size_, size_) * P_cc;
-  M.diagonal().array() += 1.0;
-  const Eigen::VectorXd b = feature_b_.head(size_);
-  const Eigen::VectorXd x = M.partialPivLu().solve(b);
-  return residual_cost - b.dot(P_cc * x);
+  auto A = gate_A_.topLeftCorner(size_, size_);
+  auto b = gate_b_.head(size_);
+  A.triangularView<Eigen::Lower>() = feature_A_.topLeftCorner(size_, size_);
+  b = feature_b_.head(size_);
+  scale_.head(size_) = A.diagonal();
+  A.selfadjointView<Eigen::Lower>().rankUpdate(W_.block(0, 3 * features_, size_, 3), -1.0);
+  rows_from_sums(A, b, scale_, gate_rows_);
+
+  const int rows = gate_rows_.count;
+  const auto H = gate_rows_.H.topLeftCorner(rows, size_);
+  auto r = gate_rows_.r.head(rows);
+  auto PHt = gate_PHt_.topLeftCorner(size_, rows);
+  PHt.noalias() = P.block(err::camera, err::camera, size_, size_) * H.transpose();
+  Eigen::Ref<Eigen::MatrixXd> S = gate_A_.topLeftCorner(rows, rows);  // the sum is read no more
+  S.noalias() = H * PHt;
+  S.diagonal().array() += 1.0;
+  const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> llt(S);  // in place
+  const double noise_cost = residual_cost - r.squaredNorm();
+  llt.matrixL().solveInPlace(r);
+  return noise_cost + r.squaredNorm();
 }
 
 void FeatureInformation::compress() {
-  rows_ = 0;
+  rows_.count = 0;
   if (features_ == 0) return;
   auto A = A_.topLeftCorner(size_, size_);
-  const Eigen::VectorXd before = A.diagonal();
+  scale_.head(size_) = A.diagonal();
   A.selfadjointView<Eigen::Lower>().rankUpdate(W_.topLeftCorner(size_, 3 * features_), -1.0);
-
-  // A = U^T U by Cholesky; the rows of U and U^-T b are the measurement. A is singular (yaw and position are free,
-  // calibration is seen in part): a pivot lost in rounding says nothing, and its row is left out.
-  auto b = b_.head(size_);
-  for (int j = 0; j < size_; ++j) {
-    const double pivot = A(j, j);
-    if (pivot <= kNegligiblePivot * before(j)) continue;
-    const int rest = size_ - j - 1;
-    const double root = std::sqrt(pivot);
-    auto u = A.col(j).tail(rest);
-    u /= root;
-    H_.row(rows_).head(j).setZero();
-    H_(rows_, j) = root;
-    H_.row(rows_).segment(j + 1, rest) = u.transpose();
-    r_(rows_) = b(j) / root;
-    b.tail(rest) -= r_(rows_) * u;
-    A.bottomRightCorner(rest, rest).selfadjointView<Eigen::Lower>().rankUpdate(u, -1.0);
-    ++rows_;
-  }
+  rows_from_sums(A, b_.head(size_), scale_, rows_);
 }
 
 }  // namespace ear

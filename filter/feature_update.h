@@ -32,6 +32,13 @@ void camera_poses(const State& x, std::vector<CameraPose>& poses);
 [[nodiscard]] LinearizedObservation linearize_observation(const State& x, int clone, int camera,
                                                           const InverseDepthPoint& point, const Eigen::Vector2d& uv);
 
+/// Linear measurement with unit covariance: residual r = H e + n, cov(n) = I. The first `count` rows are valid.
+struct WhitenedRows {
+  Eigen::MatrixXd H;
+  Eigen::VectorXd r;
+  int count = 0;
+};
+
 /// All features of one frame, summed up as the information A = H^T H, b = H^T r over the camera's part of the error
 /// vector (err::camera and what follows), whitened, each feature projected out. This equals the projection on the null
 /// space of H_f followed by a QR compression, at a fraction of the cost: the sums have the window's size, not the
@@ -56,8 +63,8 @@ class FeatureInformation {
   /// Rows equivalent to all features added: residual = H e + n, cov(n) = I. Empty if there were none. Valid until
   /// start().
   void compress();
-  [[nodiscard]] Eigen::Ref<const Eigen::MatrixXd> H() const { return H_.topLeftCorner(rows_, size_); }
-  [[nodiscard]] Eigen::Ref<const Eigen::VectorXd> residual() const { return r_.head(rows_); }
+  [[nodiscard]] Eigen::Ref<const Eigen::MatrixXd> H() const { return rows_.H.topLeftCorner(rows_.count, size_); }
+  [[nodiscard]] Eigen::Ref<const Eigen::VectorXd> residual() const { return rows_.r.head(rows_.count); }
 
  private:
   bool add_gated(const std::vector<LinearizedObservation>& observations, double sigma, double huber,
@@ -66,12 +73,15 @@ class FeatureInformation {
 
   int size_ = 0;      // columns: the camera's part of the error vector
   int features_ = 0;  // in W_
-  int rows_ = 0;
-  Eigen::MatrixXd A_, W_, H_;  // W_: H^T H_f V^-1/2 of each feature, 3 columns each
-  Eigen::VectorXd b_, r_;
+  WhitenedRows rows_;
+  Eigen::MatrixXd A_, W_;  // W_: H^T H_f V^-1/2 of each feature, 3 columns each
+  Eigen::VectorXd b_, scale_;
   Eigen::MatrixXd feature_A_;  // of the feature at hand, before projection
   Eigen::VectorXd feature_b_;
-  Eigen::MatrixXd gate_A_, gate_M_;
+  std::vector<double> weights_;  // of its observations: Huber's, over the variance
+  WhitenedRows gate_rows_;
+  Eigen::MatrixXd gate_A_, gate_PHt_;
+  Eigen::VectorXd gate_b_;
 };
 
 }  // namespace ear
