@@ -2,10 +2,24 @@
 #include <cstdlib>
 #include <exception>
 #include <iostream>
+#include <stdexcept>
+#include <string>
+#include <vector>
 
 #include "tools/commands.h"
 
 namespace {
+
+// What stands where a subcommand should and is none: CLI11 would only say that a subcommand is required.
+void refuse_unknown_subcommand(const CLI::App& app) {
+  const std::vector<std::string> unknown = app.remaining();
+  if (unknown.empty() || !app.get_subcommands().empty()) return;
+  std::string known;
+  for (const CLI::App* subcommand : app.get_subcommands([](const CLI::App*) { return true; })) {
+    known += (known.empty() ? "" : ", ") + subcommand->get_name();
+  }
+  throw std::invalid_argument("no subcommand \"" + unknown.front() + "\"; there are " + known);
+}
 
 int run_subcommand(int argc, char** argv) {
   CLI::App app{"ear: where a vehicle that drives and flies is, from cameras, IMU, wheels and lasers"};
@@ -18,6 +32,7 @@ int run_subcommand(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {  // also --help
+    refuse_unknown_subcommand(app);
     return app.exit(error);
   }
   return EXIT_SUCCESS;

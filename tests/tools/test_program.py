@@ -35,7 +35,7 @@ class CommandLine(unittest.TestCase):
         self.assert_refused(ear(), "subcommand")
 
     def test_unknown_subcommand(self):
-        self.assert_refused(ear("dance"), "subcommand")
+        self.assert_refused(ear("dance"), 'no subcommand "dance"; there are run, ')
 
     def test_unknown_option(self):
         self.assert_refused(ear("run", "recording", "--dance"), "--dance")

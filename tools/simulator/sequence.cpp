@@ -208,7 +208,7 @@ Sequence fly2() {
 
 Sequence wave1() {
   return {"wave1",
-          "40 m over waves of up to 12 degrees",
+          "41 m over waves of 10 degrees",
           Terrain({{0.035, {4.4, 1.2}, 0.3}, {0.012, {-1.5, 3.3}, 1.1}}),
           {1.8, 1.1},
           0.0,
