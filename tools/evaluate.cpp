@@ -40,12 +40,14 @@ void evaluate(const EvaluateArguments& arguments) {
   const std::vector<std::string> names = evaluation::distinct_names(estimate_paths);
   const evaluation::Trajectory truth = evaluation::read_truth(truth_path);
 
+  const std::vector<evaluation::TerrainTruth> terrain = evaluation::read_terrain(truth_path);
+
   std::vector<evaluation::ReportEntry> entries;
   std::vector<evaluation::Evaluation> evaluations;
   for (std::size_t i = 0; i < estimate_paths.size(); ++i) {
     evaluation::Estimate estimate = evaluation::read_estimate(estimate_paths[i]);
     estimate.name = names[i];
-    evaluations.push_back(evaluation::evaluate(estimate, truth, arguments.kind));
+    evaluations.push_back(evaluation::evaluate(estimate, truth, arguments.kind, terrain));
     entries.push_back({std::move(estimate), evaluations.back()});
   }
   if (!arguments.report.empty())

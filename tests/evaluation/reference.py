@@ -1,7 +1,8 @@
 """An evaluation written from the definitions in docs/evaluation.md alone, with numpy. It shares no code with the program.
 
-reference.py ESTIMATE.csv TRUTH.csv prints the figures of every alignment as JSON, under the names that
-`ear evaluate --json` uses. ESTIMATE is a states.csv, TRUTH an EuRoC csv; both are taken as well-formed.
+reference.py ESTIMATE.csv TRUTH.csv EXTRA.csv prints the figures of every alignment as JSON, under the names that
+`ear evaluate --json` uses. ESTIMATE is a states.csv, TRUTH an EuRoC csv, EXTRA a truth_extra.csv; all are taken as
+well-formed.
 """
 
 import bisect
@@ -156,7 +157,29 @@ def consistency(values):
     return {"mean": float(np.mean(values)), "inside_95": float(np.mean(inside))}
 
 
-def evaluate(estimate, truth, kind):
+def slope_error(truth, estimate, sigma, ground):
+    """Where the vehicle stands on the ground and the estimate knows a slope (it is not nan)."""
+    chosen = ground & ~np.isnan(estimate)
+    e = (truth - estimate)[chosen]
+    return {"poses": int(np.sum(chosen)), "rmse_deg": np.degrees(rms(e)),
+            "inside_3_sigma": float(np.mean(np.abs(e / sigma[chosen]) <= 3))}
+
+
+def on_the_ground(estimate, index, times, extra, z_error):
+    """Figures of the ground. The extra truth's mode is held until the next sample, its slopes are interpolated."""
+    stamps = [int(x) for x in extra["timestamp [ns]"]]
+    t = np.array([1e-9 * (stamp - stamps[0]) for stamp in stamps])
+    at = np.array([1e-9 * (time - stamps[0]) for time in times])
+    ground = numbers(extra, ["mode [0 ground 1 air]"])[[bisect.bisect_right(stamps, x) - 1 for x in times], 0] == 0
+    own = numbers(estimate, ["on_ground"])[index, 0] == 1
+    slope = {name: slope_error(np.interp(at, t, numbers(extra, [name + " [rad]"])[:, 0]),
+                               *numbers(estimate, [name, "sigma_" + name])[index].T, ground)
+             for name in ("slope_along", "slope_across")}
+    return {"ground_poses": int(np.sum(ground)), "z_rmse_m": rms(z_error[ground]),
+            "mode_agreement": float(np.mean(own == ground)), **slope}
+
+
+def evaluate(estimate, truth, extra, kind):
     t_est, t = [int(x) for x in estimate["t_ns"]], [int(x) for x in truth["timestamp [ns]"]]
     p_all, R_all = numbers(truth, ["p_x", "p_y", "p_z"]), matrix(numbers(truth, ["q_w", "q_x", "q_y", "q_z"]))
     matches, outside, in_gaps = associate(t_est, t, p_all, R_all)
@@ -201,9 +224,9 @@ def evaluate(estimate, truth, kind):
             "rotation_rmse_deg": np.degrees(rms(angles)), "rpe": [r for r in rpe if r],
             "start_to_end": {"error_m": float(np.linalg.norm(e_p[-1])), "estimated_m": float(gap_est),
                              "truth_m": float(gap_true), "difference_m": float(abs(gap_est - gap_true))},
-            "nees": nees}
+            "nees": nees, "ground": on_the_ground(estimate, index, times, extra, error[:, 2])}
 
 
 if __name__ == "__main__":
-    files = read(sys.argv[1]), read(sys.argv[2])
+    files = [read(path) for path in sys.argv[1:]]
     print(json.dumps({kind: evaluate(*files, kind) for kind in ("se3", "yaw", "none")}))

@@ -74,6 +74,42 @@ TEST_CASE("read: a states.csv is read by the names in its header") {
   CHECK(estimate.covariance[0](5, 5) == 55.0);
 }
 
+TEST_CASE("read: the ground of a states.csv, known or not") {
+  const TemporaryFolder folder("ground");
+  const std::string columns = "t_ns,p_x,p_y,p_z,q_w,q_x,q_y,q_z,on_ground";
+  folder.write("states.csv", columns + ",slope_along,slope_across,sigma_slope_along,sigma_slope_across\n" +
+                                 "1,0,0,0,1,0,0,0,1,0.1,-0.2,0.01,0.02\n2,0,0,0,1,0,0,0,0,nan,nan,nan,nan\n");
+  const std::vector<TerrainEstimate> terrain = read_estimate(folder / "states.csv").terrain;
+  REQUIRE(terrain.size() == 2);
+  CHECK(terrain[0].on_ground);
+  REQUIRE(terrain[0].slope);
+  CHECK(terrain[0].slope->along == 0.1);
+  CHECK(terrain[0].slope->across == -0.2);
+  CHECK(terrain[0].sigma.along == 0.01);
+  CHECK(terrain[0].sigma.across == 0.02);
+  CHECK_FALSE(terrain[1].on_ground);
+  CHECK_FALSE(terrain[1].slope);
+  CHECK(complaint("a.csv", columns + "\n1,0,0,0,1,0,0,0,2\n") ==
+        ":2: field 'on_ground' (column 9): '2' is neither 0 nor 1");
+  CHECK(complaint("a.csv", columns + ",slope_along\n1,0,0,0,1,0,0,0,1,0\n") ==
+        ":1: the header has no column 'slope_across'");
+}
+
+TEST_CASE("read: what a simulated recording knows of the ground") {
+  const TemporaryFolder folder("terrain");
+  CHECK(read_terrain(folder / "").empty());
+  folder.write("mav0/truth_extra.csv",
+               "#timestamp [ns],mode [0 ground 1 air],slope_along [rad],slope_across [rad],slip [m/s]\n"
+               "5,0,0.1,0.2,9\n7,1,0.3,0.4,9\n");
+  const std::vector<TerrainTruth> terrain = read_terrain(folder / "");
+  REQUIRE(terrain.size() == 2);
+  CHECK(terrain[0].t_ns == 5);
+  CHECK(terrain[0].on_ground);
+  CHECK_FALSE(terrain[1].on_ground);
+  CHECK(terrain[1].slope.along == 0.3);
+  CHECK(terrain[1].slope.across == 0.4);
+}
+
 TEST_CASE("read: a run without states.csv has no covariance") {
   const TemporaryFolder folder("plain");
   folder.write("run/estimate.tum", "0.5 1 2 3 0 0 0 1\n");

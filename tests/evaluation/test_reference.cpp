@@ -29,6 +29,8 @@ std::string pose_text(const Pose& pose) {
   return text.str();
 }
 
+Slope slope_at(double t) { return {0.2 * std::sin(t), 0.1 * std::cos(1.3 * t)}; }
+
 /// Truth with a gap from 12 to 13.5 s.
 std::string truth_file(const Trajectory& truth) {
   std::string text = "#timestamp [ns],p_x,p_y,p_z,q_w,q_x,q_y,q_z\n";
@@ -39,13 +41,27 @@ std::string truth_file(const Trajectory& truth) {
   return text;
 }
 
+/// What the ground is like from the truth's start to its end: the vehicle flies now and then.
+std::string terrain_file() {
+  std::ostringstream text;
+  text << "#timestamp [ns],mode [0 ground 1 air],slope_along [rad],slope_across [rad],slip [m/s]\n"
+       << std::setprecision(17);
+  for (const Pose& pose : walk(30.0, 20.0)) {
+    const double t = seconds_between(kStart, pose.t_ns);
+    text << pose.t_ns << ',' << (std::sin(0.7 * t) > 0.5 ? 1 : 0) << ',' << slope_at(t).along << ','
+         << slope_at(t).across << ",0\n";
+  }
+  return text.str();
+}
+
 std::string states_file(const std::vector<Pose>& poses, std::mt19937_64& rng) {
   std::ostringstream text;
   text << "t_ns,p_x,p_y,p_z,q_w,q_x,q_y,q_z";
   for (std::size_t i = 0; i < 6; ++i)
     for (std::size_t j = i; j < 6; ++j) text << ",cov_" << kErrorNames[i] << '_' << kErrorNames[j];
-  text << std::setprecision(17) << '\n';
+  text << ",on_ground,slope_along,slope_across,sigma_slope_along,sigma_slope_across" << std::setprecision(17) << '\n';
   std::normal_distribution<double> normal;
+  std::uniform_real_distribution<double> uniform;
   for (const Pose& pose : poses) {
     PoseCovariance L;
     for (int i = 0; i < 36; ++i) L(i % 6, i / 6) = 0.03 * normal(rng);
@@ -53,7 +69,13 @@ std::string states_file(const std::vector<Pose>& poses, std::mt19937_64& rng) {
     text << pose_text(pose);
     for (int i = 0; i < 6; ++i)
       for (int j = i; j < 6; ++j) text << ',' << P(i, j);
-    text << '\n';
+    const Slope slope = slope_at(seconds_between(kStart, pose.t_ns));
+    text << ',' << (uniform(rng) < 0.8 ? 1 : 0);
+    if (uniform(rng) < 0.1) {
+      text << ",nan,nan,nan,nan\n";  // not known
+    } else {
+      text << ',' << slope.along + 0.02 * normal(rng) << ',' << slope.across + 0.02 * normal(rng) << ",0.01,0.02\n";
+    }
   }
   return text.str();
 }
@@ -76,11 +98,11 @@ Trajectory estimate_poses(std::mt19937_64& rng, double extent) {
 }
 
 Json reference(const std::filesystem::path& estimate, const std::filesystem::path& truth,
-               const TemporaryFolder& folder) {
+               const std::filesystem::path& terrain, const TemporaryFolder& folder) {
   const std::filesystem::path answer = folder / "reference.json";
   const std::string command = std::string(EAR_NUMPY_PYTHON) + " -B " + EAR_SOURCE_DIR +
                               "/tests/evaluation/reference.py \"" + estimate.string() + "\" \"" + truth.string() +
-                              "\" > \"" + answer.string() + "\"";
+                              "\" \"" + terrain.string() + "\" > \"" + answer.string() + "\"";
   REQUIRE(std::system(command.c_str()) == 0);
   std::ifstream file(answer);
   return Json::parse(file);
@@ -119,16 +141,19 @@ void check_against_reference(double extent, unsigned seed) {
   const TemporaryFolder folder("reference");
   Trajectory truth = walk(30.0, 50.0);
   for (Pose& pose : truth) pose.p_WB = extent * pose.p_WB + gaussian(rng, 0.002 * std::min(1.0, extent));
-  const std::filesystem::path truth_path = folder.write("truth.csv", truth_file(truth));
+  const std::filesystem::path recording = folder / "recording";
+  const std::filesystem::path truth_path =
+      folder.write("recording/mav0/state_groundtruth_estimate0/data.csv", truth_file(truth));
+  const std::filesystem::path terrain_path = folder.write("recording/mav0/truth_extra.csv", terrain_file());
   const std::filesystem::path estimate_path = folder.write("states.csv", states_file(estimate_poses(rng, extent), rng));
 
-  const Json expected = reference(estimate_path, truth_path, folder);
+  const Json expected = reference(estimate_path, truth_path, terrain_path, folder);
   for (const AlignmentKind kind : {AlignmentKind::se3, AlignmentKind::yaw, AlignmentKind::none}) {
     CAPTURE(to_string(kind));
     Estimate estimate = read_estimate(estimate_path);
     for (const bool with_covariance : {true, false}) {
       if (!with_covariance) estimate.covariance.clear();
-      const Evaluation result = evaluate(estimate, read_truth(truth_path), kind);
+      const Evaluation result = evaluate(estimate, read_truth(recording), kind, read_terrain(recording));
       CHECK(result.in_gaps > 0);
       CHECK(result.outside > 0);
       const Json ours = Json::parse(to_json({result}, "truth"))["estimates"][0];

@@ -2,16 +2,18 @@
 //
 //   track_accuracy --sequences flat1,fly1 --seeds 501..505 --calibration both --rate 30,10 --config a.yaml
 //
-// One Markdown table per configuration file, one row per sequence, camera rate and calibration.
+// One row of a Markdown table per sequence, camera rate, calibration and configuration file, over all seeds.
 #include <CLI/CLI.hpp>
-#include <algorithm>
 #include <atomic>
 #include <cstdlib>
 #include <exception>
 #include <filesystem>
+#include <functional>
 #include <iostream>
 #include <map>
 #include <mutex>
+#include <optional>
+#include <stdexcept>
 #include <string>
 #include <thread>
 #include <vector>
@@ -38,30 +40,35 @@ struct Arguments {
   bool json = false;
 };
 
-/// One simulation, and which calibrations the filter is told on it.
-struct Job {
-  simulator::Options options;
-  std::vector<bool> true_calibration;
+/// How the filter is set up on every simulation.
+struct Variant {
+  bool true_calibration = true;
+  std::string settings;
+  FilterConfig config;
 };
+
+std::uint64_t parse_seed(const std::string& text) {
+  if (text.empty() || text.find_first_not_of("0123456789") != std::string::npos) {
+    throw std::invalid_argument("--seeds: '" + text + "' is no seed: a number, or two as in 501..505");
+  }
+  return std::stoull(text);
+}
 
 /// "501..505", "7" -> the numbers.
 std::vector<std::uint64_t> parse_seeds(const std::vector<std::string>& texts) {
   std::vector<std::uint64_t> seeds;
   for (const std::string& text : texts) {
     const std::size_t dots = text.find("..");
-    const std::uint64_t first = std::stoull(text.substr(0, dots));
-    const std::uint64_t last = dots == std::string::npos ? first : std::stoull(text.substr(dots + 2));
+    const std::uint64_t first = parse_seed(text.substr(0, dots));
+    const std::uint64_t last = dots == std::string::npos ? first : parse_seed(text.substr(dots + 2));
     for (std::uint64_t seed = first; seed <= last; ++seed) seeds.push_back(seed);
   }
   return seeds;
 }
 
-std::vector<Job> jobs_of(const Arguments& args) {
+std::vector<simulator::Options> simulations_of(const Arguments& args) {
   const bool all = args.sequences == std::vector<std::string>{"all"};
-  std::vector<bool> calibrations;
-  if (args.calibration != "wrong") calibrations.push_back(true);
-  if (args.calibration != "true") calibrations.push_back(false);
-  std::vector<Job> jobs;
+  std::vector<simulator::Options> simulations;
   for (const std::string& sequence : all ? simulator::sequence_names() : args.sequences) {
     for (const double rate : args.rates) {
       for (const std::uint64_t seed : parse_seeds(args.seeds)) {
@@ -70,71 +77,81 @@ std::vector<Job> jobs_of(const Arguments& args) {
         options.seed = seed;
         options.camera_rate_hz = rate;
         options.duration = args.duration;
-        jobs.push_back({options, calibrations});
+        simulations.push_back(options);
       }
     }
   }
-  return jobs;
+  return simulations;
 }
 
-/// All runs of one job. The samples do not depend on the calibration told, so they are simulated once.
-std::vector<Run> run(const Job& job, const FilterConfig& config, evaluation::AlignmentKind alignment) {
-  const simulator::Simulation simulation(job.options);
+std::vector<Variant> variants_of(const Arguments& args) {
+  std::vector<Variant> settings;
+  if (args.configs.empty()) settings.push_back({true, "default", FilterConfig{}});
+  for (const std::filesystem::path& file : args.configs) {
+    settings.push_back({true, file.stem().string(), load_config(file).filter});
+  }
+  std::vector<Variant> variants;
+  for (const bool true_calibration : {true, false}) {
+    if (args.calibration == (true_calibration ? "wrong" : "true")) continue;
+    for (Variant variant : settings) {
+      variant.true_calibration = true_calibration;
+      variants.push_back(variant);
+    }
+  }
+  return variants;
+}
+
+/// All variants on one simulation: the samples do not depend on the calibration told.
+std::vector<Run> run(const simulator::Options& options, const std::vector<Variant>& variants,
+                     evaluation::AlignmentKind alignment) {
+  const simulator::Simulation simulation(options);
   std::vector<Run> runs;
-  for (const bool true_calibration : job.true_calibration) {
-    const Calibration& told = true_calibration ? simulation.true_calibration() : simulation.calibration();
-    runs.push_back({{job.options.sequence, job.options.camera_rate_hz, true_calibration},
-                    job.options.seed,
-                    measure(simulation, told, config, alignment)});
+  for (const Variant& variant : variants) {
+    const Calibration& told = variant.true_calibration ? simulation.true_calibration() : simulation.calibration();
+    runs.push_back({{options.sequence, options.camera_rate_hz, variant.true_calibration, variant.settings},
+                    options.seed,
+                    measure(simulation, told, variant.config, alignment)});
   }
   return runs;
 }
 
-/// All jobs on several threads; the result does not depend on their number.
-std::vector<Run> run_all(const std::vector<Job>& jobs, const FilterConfig& config, const Arguments& args) {
-  std::vector<std::vector<Run>> results(jobs.size());
+/// Runs work(0) .. work(count - 1) on several threads; the first exception ends it and is thrown.
+void in_parallel(std::size_t count, int threads, const std::function<void(std::size_t)>& work) {
   std::atomic<std::size_t> next{0};
   std::mutex mutex;
   std::exception_ptr failure;
-  std::size_t done = 0;
-  tools::Progress progress;
-  const auto work = [&] {
+  const auto loop = [&] {
     try {
-      for (std::size_t i = next++; i < jobs.size(); i = next++) {
-        results[i] = run(jobs[i], config, args.alignment);
-        const std::lock_guard<std::mutex> lock(mutex);
-        progress.show(std::to_string(++done) + " of " + std::to_string(jobs.size()) + " simulations");
-      }
+      for (std::size_t i = next++; i < count; i = next++) work(i);
     } catch (...) {
       const std::lock_guard<std::mutex> lock(mutex);
-      failure = std::current_exception();
-      next = jobs.size();
+      if (!failure) failure = std::current_exception();
+      next = count;
     }
   };
-  std::vector<std::thread> threads;
-  for (int i = 0; i < args.threads; ++i) threads.emplace_back(work);
-  for (std::thread& thread : threads) thread.join();
-  progress.finish();
+  std::vector<std::thread> pool;
+  for (int i = 0; i < threads; ++i) pool.emplace_back(loop);
+  for (std::thread& thread : pool) thread.join();
   if (failure) std::rethrow_exception(failure);
-
-  std::vector<Run> runs;
-  for (const std::vector<Run>& result : results) runs.insert(runs.end(), result.begin(), result.end());
-  return runs;
 }
 
 void track_accuracy(const Arguments& args) {
-  std::vector<std::filesystem::path> configs = args.configs;
-  if (configs.empty()) configs.emplace_back();
-  const std::vector<Job> jobs = jobs_of(args);
-  for (const std::filesystem::path& file : configs) {
-    const Config config = file.empty() ? Config{} : load_config(file);
-    const std::vector<Run> runs = run_all(jobs, config.filter, args);
-    if (args.json) {
-      std::cout << to_json(runs) << std::flush;
-      continue;
-    }
-    std::cout << (file.empty() ? "default settings" : file.string()) << "\n\n" << to_markdown(runs) << std::endl;
-  }
+  const std::vector<simulator::Options> simulations = simulations_of(args);
+  const std::vector<Variant> variants = variants_of(args);
+  std::vector<std::vector<Run>> results(simulations.size());
+  std::mutex mutex;
+  std::size_t done = 0;
+  tools::Progress progress;
+  in_parallel(simulations.size(), args.threads, [&](std::size_t i) {
+    results[i] = run(simulations[i], variants, args.alignment);
+    const std::lock_guard<std::mutex> lock(mutex);
+    progress.show(std::to_string(++done) + " of " + std::to_string(simulations.size()) + " simulations");
+  });
+  progress.finish();
+
+  std::vector<Run> runs;
+  for (const std::vector<Run>& result : results) runs.insert(runs.end(), result.begin(), result.end());
+  std::cout << (args.json ? to_json(runs) : to_markdown(runs));
 }
 
 int parse_and_run(int argc, char** argv) {
@@ -152,7 +169,7 @@ int parse_and_run(int argc, char** argv) {
       ->delimiter(',')
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  app.add_option("--config", args.configs, "settings, several with commas: a table for each")
+  app.add_option("--config", args.configs, "settings, several with commas: a row for each")
       ->delimiter(',')
       ->check(CLI::ExistingFile);
   app.add_option("--align", args.alignment, "se3, yaw or none, as in ear evaluate")

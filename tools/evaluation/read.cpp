@@ -31,17 +31,11 @@ constexpr std::array<const char*, 3> kPositionNames{"p_x", "p_y", "p_z"};
 constexpr std::array<const char*, 4> kQuaternionNames{"q_w", "q_x", "q_y", "q_z"};
 constexpr std::array<const char*, 6> kErrorNames{"x", "y", "z", "rx", "ry", "rz"};
 
-std::size_t required_column(const TextTable& table, const std::string& name) {
-  const std::optional<std::size_t> column = table.column(name);
-  if (!column) table.fail("the header has no column '" + name + "'");
-  return *column;
-}
-
 PoseColumns named_columns(const TextTable& table) {
   PoseColumns columns;
-  columns.time = required_column(table, "t_ns");
-  for (std::size_t i = 0; i < 3; ++i) columns.p[i] = required_column(table, kPositionNames[i]);
-  for (std::size_t i = 0; i < 4; ++i) columns.q_wxyz[i] = required_column(table, kQuaternionNames[i]);
+  columns.time = table.required_column("t_ns");
+  for (std::size_t i = 0; i < 3; ++i) columns.p[i] = table.required_column(kPositionNames[i]);
+  for (std::size_t i = 0; i < 4; ++i) columns.q_wxyz[i] = table.required_column(kQuaternionNames[i]);
   return columns;
 }
 
@@ -91,7 +85,7 @@ std::vector<PoseCovariance> read_covariances(const TextTable& table) {
   for (std::size_t i = 0; i < 6; ++i) {
     for (std::size_t j = i; j < 6; ++j) {
       const std::string name = covariance_name(i, j);
-      const std::size_t column = required_column(table, name);
+      const std::size_t column = table.required_column(name);
       const auto a = static_cast<Eigen::Index>(i);
       const auto b = static_cast<Eigen::Index>(j);
       for (std::size_t k = 0; k < covariances.size(); ++k)
@@ -99,6 +93,29 @@ std::vector<PoseCovariance> read_covariances(const TextTable& table) {
     }
   }
   return covariances;
+}
+
+/// One entry per row, or nothing if the file says nothing about the ground.
+std::vector<TerrainEstimate> read_terrain_estimates(const TextTable& table) {
+  if (!table.column("on_ground")) return {};
+  const std::size_t on_ground = table.required_column("on_ground");
+  const bool with_slope = table.column("slope_along").has_value();
+  constexpr std::array<const char*, 4> kNames{"slope_along", "slope_across", "sigma_slope_along", "sigma_slope_across"};
+  std::array<std::size_t, 4> columns{};
+  for (std::size_t i = 0; with_slope && i < kNames.size(); ++i) columns[i] = table.required_column(kNames[i]);
+
+  std::vector<TerrainEstimate> result;
+  for (const Row& row : table.rows()) {
+    TerrainEstimate estimate;
+    estimate.on_ground = table.flag(row, on_ground, "on_ground");
+    if (with_slope && table.optional_number(row, columns[0], kNames[0])) {
+      const auto value = [&](std::size_t i) { return table.number(row, columns[i], kNames[i]); };
+      estimate.slope = Slope{value(0), value(1)};
+      estimate.sigma = {value(2), value(3)};
+    }
+    result.push_back(estimate);
+  }
+  return result;
 }
 
 std::vector<std::string> read_labels(const TextTable& table, const std::string& name) {
@@ -147,11 +164,33 @@ Trajectory read_truth(const fs::path& path) {
       TextTable(file_in(path, {"mav0/state_groundtruth_estimate0/data.csv", "state_groundtruth_estimate0/data.csv"})));
 }
 
+std::vector<TerrainTruth> read_terrain(const fs::path& recording) {
+  fs::path file = recording / "mav0" / "truth_extra.csv";
+  if (!fs::exists(file)) file = recording / "truth_extra.csv";
+  if (!fs::exists(file)) return {};
+  const TextTable table(file);
+  constexpr std::array<const char*, 4> kNames{"timestamp [ns]", "mode [0 ground 1 air]", "slope_along [rad]",
+                                              "slope_across [rad]"};
+  std::array<std::size_t, 4> columns{};
+  for (std::size_t i = 0; i < kNames.size(); ++i) columns[i] = table.required_column(kNames[i]);
+  std::vector<TerrainTruth> terrain;
+  for (const Row& row : table.rows()) {
+    const TerrainTruth truth{table.time(row, columns[0], kNames[0], 0),
+                             !table.flag(row, columns[1], kNames[1]),
+                             {table.number(row, columns[2], kNames[2]), table.number(row, columns[3], kNames[3])}};
+    if (!terrain.empty() && truth.t_ns <= terrain.back().t_ns)
+      table.fail(row, columns[0], kNames[0], "not later than the line before");
+    terrain.push_back(truth);
+  }
+  return terrain;
+}
+
 Estimate read_estimate(const fs::path& path) {
   const TextTable table(file_in(path, {"states.csv", "estimate.tum"}));
   Estimate estimate;
   estimate.poses = read_poses(table);
   estimate.covariance = read_covariances(table);
+  estimate.terrain = read_terrain_estimates(table);
   estimate.mode = read_labels(table, "mode");
   estimate.health = read_labels(table, "health");
   return estimate;

@@ -73,6 +73,28 @@ void add_nees_rows(const std::vector<Evaluation>& evaluations, std::vector<Summa
   add("  inside 95 % band [%]", 1, [](const Nees& n) { return 100.0 * n.orientation.inside; });
 }
 
+void add_terrain_rows(const std::vector<Evaluation>& evaluations, std::vector<SummaryRow>& rows) {
+  using Value = std::optional<double>;
+  const auto add = [&](const std::string& label, int decimals, bool less_is_better,
+                       const std::function<Value(const TerrainFigures&)>& get) {
+    SummaryRow added = row(evaluations, label, decimals, less_is_better,
+                           [&](const Evaluation& e) { return e.terrain ? get(*e.terrain) : std::nullopt; });
+    if (std::any_of(added.values.begin(), added.values.end(), [](const Value& value) { return value.has_value(); }))
+      rows.push_back(std::move(added));
+  };
+  const auto add_angle = [&](const std::string& label, std::optional<SlopeError> TerrainFigures::*angle) {
+    add(label + " RMSE [deg]", 3, true,
+        [&](const TerrainFigures& t) { return t.*angle ? Value(kDegPerRad * (t.*angle)->rmse) : std::nullopt; });
+    add("  inside 3 sigma [%]", 1, false,
+        [&](const TerrainFigures& t) { return t.*angle ? Value(100.0 * (t.*angle)->inside) : std::nullopt; });
+  };
+  add("z RMSE on the ground [m]", 4, true, [](const TerrainFigures& t) { return t.z_rmse; });
+  add_angle("slope along", &TerrainFigures::along);
+  add_angle("slope across", &TerrainFigures::across);
+  add("ground or air, right [%]", 1, false,
+      [](const TerrainFigures& t) { return t.mode_agreement ? Value(100.0 * *t.mode_agreement) : std::nullopt; });
+}
+
 std::size_t largest_width(const std::vector<std::string>& texts) {
   std::size_t width = 0;
   for (const std::string& text : texts) width = std::max(width, text.size());
@@ -100,6 +122,22 @@ Json relative_json(const Evaluation& evaluation) {
   return list;
 }
 
+Json to_json(const std::optional<SlopeError>& error) {
+  if (!error) return nullptr;
+  return {{"poses", error->poses}, {"rmse_deg", kDegPerRad * error->rmse}, {"inside_3_sigma", error->inside}};
+}
+
+Json terrain_json(const Evaluation& evaluation) {
+  if (!evaluation.terrain) return nullptr;
+  const TerrainFigures& terrain = *evaluation.terrain;
+  const auto optional = [](const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); };
+  return {{"ground_poses", terrain.ground_poses},
+          {"z_rmse_m", optional(terrain.z_rmse)},
+          {"mode_agreement", optional(terrain.mode_agreement)},
+          {"slope_along", to_json(terrain.along)},
+          {"slope_across", to_json(terrain.across)}};
+}
+
 Json to_json(const Evaluation& e) {
   return {{"name", e.name},
           {"poses", e.poses},
@@ -121,7 +159,8 @@ Json to_json(const Evaluation& e) {
             {"estimated_m", e.start_to_end.estimated},
             {"truth_m", e.start_to_end.truth},
             {"difference_m", e.start_to_end.difference}}},
-          {"nees", nees_json(e)}};
+          {"nees", nees_json(e)},
+          {"ground", terrain_json(e)}};
 }
 
 }  // namespace
@@ -157,6 +196,7 @@ std::vector<SummaryRow> summary_rows(const std::vector<Evaluation>& evaluations)
       make("|end - start|, off by [m]", 4, true, [](const E& e) { return e.start_to_end.difference; }),
   };
   add_relative_rows(evaluations, rows);
+  add_terrain_rows(evaluations, rows);
   add_nees_rows(evaluations, rows);
   return rows;
 }

@@ -143,12 +143,29 @@ std::optional<std::size_t> TextTable::column(const std::string& name) const {
   return static_cast<std::size_t>(found - header_.begin());
 }
 
+std::size_t TextTable::required_column(const std::string& name) const {
+  const std::optional<std::size_t> found = column(name);
+  if (!found) fail("the header has no column '" + name + "'");
+  return *found;
+}
+
 double TextTable::number(const Row& row, std::size_t column, const std::string& name) const {
   const std::string& text = row.fields[column];
   const std::optional<double> value = as_number(text);
   if (!value) fail(row, column, name, "'" + text + "' is no number");
   if (!std::isfinite(*value)) fail(row, column, name, "'" + text + "' is not finite");
   return *value;
+}
+
+std::optional<double> TextTable::optional_number(const Row& row, std::size_t column, const std::string& name) const {
+  if (row.fields[column] == "nan") return std::nullopt;
+  return number(row, column, name);
+}
+
+bool TextTable::flag(const Row& row, std::size_t column, const std::string& name) const {
+  const std::string& text = row.fields[column];
+  if (text != "0" && text != "1") fail(row, column, name, "'" + text + "' is neither 0 nor 1");
+  return text == "1";
 }
 
 TimeNs TextTable::time(const Row& row, std::size_t column, const std::string& name, int exponent) const {

@@ -32,8 +32,18 @@ class TextTable {
   /// Position of the column with this name in the header.
   [[nodiscard]] std::optional<std::size_t> column(const std::string& name) const;
 
+  /// The same; throws if there is none.
+  [[nodiscard]] std::size_t required_column(const std::string& name) const;
+
   /// A field as a finite number; `name` is for the error only.
   [[nodiscard]] double number(const Row& row, std::size_t column, const std::string& name) const;
+
+  /// The same, but "nan" is a value that is not known.
+  [[nodiscard]] std::optional<double> optional_number(const Row& row, std::size_t column,
+                                                      const std::string& name) const;
+
+  /// A field that is 0 or 1.
+  [[nodiscard]] bool flag(const Row& row, std::size_t column, const std::string& name) const;
 
   /// A field of decimal digits as integer nanoseconds: the field's value times 10^`exponent` (0: it is in nanoseconds,
   /// 9: in seconds), rounded to the nearest, with no floating point in between.

@@ -94,7 +94,9 @@ std::string number_text(double value) {
 }
 
 bool same(const Setup& a, const Setup& b) {
-  const auto tie = [](const Setup& s) { return std::tie(s.sequence, s.camera_rate_hz, s.true_calibration); };
+  const auto tie = [](const Setup& s) {
+    return std::tie(s.sequence, s.camera_rate_hz, s.true_calibration, s.settings);
+  };
   return tie(a) == tie(b);
 }
 
@@ -130,8 +132,8 @@ std::string to_markdown(const std::vector<Run>& runs) {
   std::copy_if(kColumns.begin(), kColumns.end(), std::back_inserter(columns),
                [&](const Column& column) { return !values_of(runs, column.field).empty(); });
 
-  std::string text = "| sequence | Hz | calibration | seeds |";
-  std::string rule = "|---|---|---|---|";
+  std::string text = "| sequence | Hz | calibration | settings | seeds |";
+  std::string rule = "|---|---|---|---|---|";
   for (const Column& column : columns) {
     text += std::string(" ") + column.label + " |";
     rule += "---|";
@@ -140,7 +142,8 @@ std::string to_markdown(const std::vector<Run>& runs) {
   for (const std::vector<Run>& row : rows_of(runs)) {
     const Setup& setup = row.front().setup;
     const std::size_t estimated = values_of(row, &Figures::ate_rmse).size();
-    text += "| " + setup.sequence + " | " + number_text(setup.camera_rate_hz) + " | " + calibration_text(setup) + " | ";
+    text += "| " + setup.sequence + " | " + number_text(setup.camera_rate_hz) + " | " + calibration_text(setup) +
+            " | " + setup.settings + " | ";
     text += (estimated < row.size() ? std::to_string(estimated) + " of " : "") + std::to_string(row.size()) + " |";
     for (const Column& column : columns) {
       const Values values = values_of(row, column.field);
@@ -157,6 +160,7 @@ std::string to_json(const std::vector<Run>& runs) {
     Json item{{"sequence", run.setup.sequence},
               {"camera_rate_hz", run.setup.camera_rate_hz},
               {"calibration", calibration_text(run.setup)},
+              {"settings", run.setup.settings},
               {"seed", run.seed}};
     for (const NamedField& field : kFields) {
       const std::optional<double>& value = run.figures.*field.field;

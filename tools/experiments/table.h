@@ -13,7 +13,8 @@ namespace ear::experiments {
 struct Setup {
   std::string sequence;
   double camera_rate_hz = 30.0;
-  bool true_calibration = true;  ///< the filter is told the true calibration, or a slightly wrong one
+  bool true_calibration = true;      ///< the filter is told the true calibration, or a slightly wrong one
+  std::string settings = "default";  ///< name of the filter's settings
 };
 
 struct Run {

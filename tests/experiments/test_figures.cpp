@@ -1,0 +1,40 @@
+#include <doctest/doctest.h>
+
+#include "tools/experiments/figures.h"
+
+namespace ear::experiments {
+namespace {
+
+simulator::Simulation simulate(double duration) {
+  simulator::Options options;
+  options.seed = 8301;
+  options.duration = duration;
+  return simulator::Simulation(options);
+}
+
+TEST_CASE("figures: of a short drive") {
+  const simulator::Simulation simulation = simulate(12.0);
+  const Figures figures =
+      measure(simulation, simulation.true_calibration(), FilterConfig{}, evaluation::AlignmentKind::yaw);
+  REQUIRE(figures.ate_rmse);
+  CHECK(*figures.ate_rmse > 1e-5);
+  CHECK(*figures.ate_rmse < 0.05);
+  CHECK(*figures.length == doctest::Approx(simulation.path_length()).epsilon(0.02));
+  CHECK(*figures.ate_percent == doctest::Approx(100.0 * *figures.ate_rmse / *figures.length));
+  CHECK(*figures.z_rmse_ground == doctest::Approx(*figures.z_rmse));  // flat1 never flies
+  CHECK(*figures.coverage > 90.0);
+  CHECK(*figures.coverage < 100.0);  // it starts after half a second of standing
+  CHECK(*figures.nees_position > 0.0);
+  CHECK(*figures.sigma_position > 1e-4);
+}
+
+TEST_CASE("figures: a vehicle that never starts has coverage 0 and nothing else") {
+  const simulator::Simulation simulation = simulate(0.3);
+  const Figures figures = measure(simulation, simulation.calibration(), FilterConfig{}, evaluation::AlignmentKind::yaw);
+  CHECK(figures.coverage == 0.0);
+  CHECK_FALSE(figures.ate_rmse);
+  CHECK_FALSE(figures.length);
+}
+
+}  // namespace
+}  // namespace ear::experiments
