@@ -78,9 +78,10 @@ TEST_CASE("read: the ground of a states.csv, known or not") {
   const TemporaryFolder folder("ground");
   const std::string columns = "t_ns,p_x,p_y,p_z,q_w,q_x,q_y,q_z,on_ground";
   folder.write("states.csv", columns + ",slope_along,slope_across,sigma_slope_along,sigma_slope_across\n" +
-                                 "1,0,0,0,1,0,0,0,1,0.1,-0.2,0.01,0.02\n2,0,0,0,1,0,0,0,0,nan,nan,nan,nan\n");
+                                 "1,0,0,0,1,0,0,0,1,0.1,-0.2,0.01,0.02\n2,0,0,0,1,0,0,0,0,nan,nan,nan,nan\n"
+                                 "3,0,0,0,1,0,0,0,0,,,,\n");
   const std::vector<TerrainEstimate> terrain = read_estimate(folder / "states.csv").terrain;
-  REQUIRE(terrain.size() == 2);
+  REQUIRE(terrain.size() == 3);
   CHECK(terrain[0].on_ground);
   REQUIRE(terrain[0].slope);
   CHECK(terrain[0].slope->along == 0.1);
@@ -89,6 +90,7 @@ TEST_CASE("read: the ground of a states.csv, known or not") {
   CHECK(terrain[0].sigma.across == 0.02);
   CHECK_FALSE(terrain[1].on_ground);
   CHECK_FALSE(terrain[1].slope);
+  CHECK_FALSE(terrain[2].slope);
   CHECK(complaint("a.csv", columns + "\n1,0,0,0,1,0,0,0,2\n") ==
         ":2: field 'on_ground' (column 9): '2' is neither 0 nor 1");
   CHECK(complaint("a.csv", columns + ",slope_along\n1,0,0,0,1,0,0,0,1,0\n") ==

@@ -1,35 +1,88 @@
 #!/usr/bin/env python3
 """Accuracy on rendered recordings: simulates, runs and evaluates, and prints the tables of docs/results.md.
 
-    tools/benchmarks/accuracy.py EAR [--sequences flat1 fly1] [--seeds 101 102 103 104 105] [--work DIR] [--keep]
+    tools/benchmarks/accuracy.py EAR [--sequences flat1 fly1 | all] [--seeds 101 102] [--odometer none terrain]
+                                 [--calibration true wrong] [--work DIR] [--keep]
 
 Every recording is run with the true calibration and with the slightly wrong one; the pictures are rendered once.
+Recordings that are in DIR already, as SEQUENCE_SEED (wrong) and SEQUENCE_SEED_true, are used and left there. What
+`ear run` wrote stays in DIR/runs.
 """
 import argparse
 import json
+import re
 import shutil
 import statistics
 import subprocess
 from pathlib import Path
+
+# Columns of the table: title, path of the figure in the evaluation's JSON, factor, decimals.
+COLUMNS = [
+    ("ATE [m]", ["ate_rmse_m"], 1, 4),
+    ("ATE [%]", ["ate_percent"], 1, 3),
+    ("z [m]", ["z_rmse_m"], 1, 4),
+    ("z on ground [m]", ["ground", "z_rmse_m"], 1, 4),
+    ("rotation [deg]", ["rotation_rmse_deg"], 1, 3),
+    ("start-end [m]", ["start_to_end", "error_m"], 1, 4),
+    ("NEES p", ["nees", "position", "mean"], 1, 2),
+    ("NEES R", ["nees", "orientation", "mean"], 1, 2),
+    ("slope along [deg]", ["ground", "slope_along", "rmse_deg"], 1, 3),
+    ("in 3 sigma [%]", ["ground", "slope_along", "inside_3_sigma"], 100, 1),
+    ("slope across [deg]", ["ground", "slope_across", "rmse_deg"], 1, 3),
+    ("in 3 sigma [%]", ["ground", "slope_across", "inside_3_sigma"], 100, 1),
+    ("mode right [%]", ["ground", "mode_agreement"], 100, 1),
+    ("coverage [%]", ["coverage"], 100, 1),
+]
 
 
 def call(*arguments):
     return subprocess.run([str(a) for a in arguments], check=True, capture_output=True, text=True).stdout
 
 
-def evaluate(ear, recording, out):
-    call(ear, "run", recording, "--out", out)
-    return json.loads(call(ear, "evaluate", out, recording, "--json"))["estimates"][0]
+def all_sequences(ear):
+    text = call(ear, "simulate", "--help").split("Sequences:")[1].split("\n\n")[0]
+    return re.findall(r"^\s+(\w+): ", text, re.MULTILINE)
 
 
-def one_seed(ear, sequence, seed, work):
-    """Figures with the true calibration and with the wrong one."""
-    true, wrong = work / f"{sequence}-{seed}-true", work / f"{sequence}-{seed}-wrong"
-    if not true.exists():
-        call(ear, "simulate", sequence, "--seed", seed, "--out", true, "--perfect-calibration")
-    if not wrong.exists():
-        call(ear, "simulate", sequence, "--seed", seed, "--out", wrong, "--images-from", true)
-    return [evaluate(ear, r, work / (r.name + "-run")) for r in (true, wrong)]
+def recording(ear, sequence, seed, calibration, work, made):
+    """The recording's folder, made if it is not there yet; pictures come from its sibling where that is there."""
+    folders = {"true": work / f"{sequence}_{seed}_true", "wrong": work / f"{sequence}_{seed}"}
+    folder = folders.pop(calibration)
+    (sibling,) = folders.values()
+    if not folder.exists():
+        made.append(folder)
+        call(ear, "simulate", sequence, "--seed", seed, "--out", folder,
+             *(["--perfect-calibration"] if calibration == "true" else []),
+             *(["--images-from", sibling] if sibling.exists() else []))
+    return folder
+
+
+def evaluate(ear, folder, odometer, out):
+    """The evaluation's JSON, or nothing if the run has no estimate."""
+    try:
+        call(ear, "run", folder, "--out", out, *(["--odometer", odometer] if odometer else []))
+    except subprocess.CalledProcessError as error:
+        print(error.stderr, flush=True)
+        return None
+    return json.loads(call(ear, "evaluate", out, folder, "--json"))["estimates"][0]
+
+
+def figure(evaluation, path):
+    for key in path:
+        evaluation = evaluation and evaluation.get(key)
+    return evaluation
+
+
+def cells(evaluations):
+    """The median over the seeds of each column; of ATE also the worst and each seed's."""
+    done = [e for e in evaluations if e]
+    row = [str(len(done)) if len(done) == len(evaluations) else f"{len(done)} of {len(evaluations)}"]
+    for title, path, factor, decimals in COLUMNS:
+        values = [factor * v for v in (figure(e, path) for e in done) if v is not None]
+        row.append(f"{statistics.median(values):.{decimals}f}" if values else "-")
+        if title.startswith("ATE"):
+            row.append(f"{max(values):.{decimals}f}" if values else "-")
+    return row
 
 
 def main():
@@ -37,19 +90,30 @@ def main():
     parser.add_argument("ear", type=Path)
     parser.add_argument("--sequences", nargs="+", default=["flat1", "fly1"])
     parser.add_argument("--seeds", nargs="+", type=int, default=[101, 102, 103, 104, 105])
+    parser.add_argument("--odometer", nargs="+", default=[None], help="models to compare; without: the default")
+    parser.add_argument("--calibration", nargs="+", choices=["true", "wrong"], default=["true", "wrong"])
     parser.add_argument("--work", type=Path, default=Path("build/accuracy"))
-    parser.add_argument("--keep", action="store_true", help="keep the recordings, about 1 GB each")
+    parser.add_argument("--keep", action="store_true", help="keep the recordings that it makes, about 1 GB each")
     args = parser.parse_args()
     args.work.mkdir(parents=True, exist_ok=True)
-    print("| sequence | calibration | ATE RMSE, median [% of length] | worst | per seed |\n|---|---|---|---|---|", flush=True)
-    for sequence in args.sequences:
-        figures = [one_seed(args.ear, sequence, seed, args.work) for seed in args.seeds]
-        for which, calibration in enumerate(("true", "slightly wrong")):
-            ate = [f[which]["ate_percent"] for f in figures]
-            per_seed = ", ".join(f"{a:.3f}" for a in ate)
-            print(f"| {sequence} | {calibration} | {statistics.median(ate):.3f} | {max(ate):.3f} | {per_seed} |", flush=True)
-    if not args.keep:
-        shutil.rmtree(args.work)
+    titles = ["sequence", "odometer", "calibration", "seeds"]
+    for title, *_ in COLUMNS:
+        titles += [title, "worst"] if title.startswith("ATE") else [title]
+    print("| " + " | ".join(titles) + " |\n" + "|---" * len(titles) + "|", flush=True)
+
+    for sequence in all_sequences(args.ear) if args.sequences == ["all"] else args.sequences:
+        rows = {(odometer, calibration): [] for odometer in args.odometer for calibration in args.calibration}
+        for seed in args.seeds:
+            made = []
+            for (odometer, calibration), evaluations in rows.items():
+                folder = recording(args.ear, sequence, seed, calibration, args.work, made)
+                out = args.work / "runs" / f"{folder.name}_{odometer or 'default'}"
+                evaluations.append(evaluate(args.ear, folder, odometer, out))
+            for folder in made if not args.keep else []:
+                shutil.rmtree(folder)
+        for (odometer, calibration), evaluations in rows.items():
+            row = [sequence, odometer or "default", calibration, *cells(evaluations)]
+            print("| " + " | ".join(row) + " |", flush=True)
 
 
 if __name__ == "__main__":

@@ -22,6 +22,7 @@
 #include "tools/evaluation/alignment.h"
 #include "tools/experiments/table.h"
 #include "tools/progress.h"
+#include "tools/simulator/faults.h"
 #include "tools/simulator/sequence.h"
 #include "tools/simulator/simulation.h"
 
@@ -36,6 +37,7 @@ struct Arguments {
   std::vector<std::filesystem::path> configs;
   evaluation::AlignmentKind alignment = evaluation::AlignmentKind::yaw;
   std::optional<double> duration;
+  std::vector<std::string> faults;
   int threads = 2;
   bool json = false;
 };
@@ -77,6 +79,7 @@ std::vector<simulator::Options> simulations_of(const Arguments& args) {
         options.seed = seed;
         options.camera_rate_hz = rate;
         options.duration = args.duration;
+        for (const std::string& fault : args.faults) options.faults.push_back(simulator::parse_fault(fault));
         simulations.push_back(options);
       }
     }
@@ -176,6 +179,7 @@ int parse_and_run(int argc, char** argv) {
       ->transform(CLI::CheckedTransformer(alignments, CLI::ignore_case).description(""))
       ->default_str("yaw");
   app.add_option("--duration", args.duration, "[s] stop earlier");
+  app.add_option("--fault", args.faults, "what goes wrong, as in ear simulate; may be repeated");
   app.add_option("--threads", args.threads, "the figures do not depend on it")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();

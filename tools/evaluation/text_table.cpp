@@ -158,7 +158,7 @@ double TextTable::number(const Row& row, std::size_t column, const std::string& 
 }
 
 std::optional<double> TextTable::optional_number(const Row& row, std::size_t column, const std::string& name) const {
-  if (row.fields[column] == "nan") return std::nullopt;
+  if (row.fields[column].empty() || row.fields[column] == "nan") return std::nullopt;
   return number(row, column, name);
 }
 

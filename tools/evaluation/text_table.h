@@ -38,7 +38,7 @@ class TextTable {
   /// A field as a finite number; `name` is for the error only.
   [[nodiscard]] double number(const Row& row, std::size_t column, const std::string& name) const;
 
-  /// The same, but "nan" is a value that is not known.
+  /// The same, but an empty field or "nan" is a value that is not known.
   [[nodiscard]] std::optional<double> optional_number(const Row& row, std::size_t column,
                                                       const std::string& name) const;
 

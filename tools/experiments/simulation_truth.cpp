@@ -6,16 +6,14 @@
 namespace ear::experiments {
 namespace {
 
-/// Stamps of the IMU from the first to the last, and those of `times` between them.
+/// Where truth is recorded from the first to the last, and those of `times` between them.
 std::vector<TimeNs> stamps(const simulator::Simulation& simulation, const std::vector<TimeNs>& times) {
-  std::vector<TimeNs> imu;
-  imu.reserve(simulation.imu().size());
-  for (const ImuSample& sample : simulation.imu()) imu.push_back(sample.t_ns);
+  const std::vector<TimeNs>& recorded = simulation.truth_times();
   std::vector<TimeNs> inside;
   std::copy_if(times.begin(), times.end(), std::back_inserter(inside),
-               [&](TimeNs t_ns) { return t_ns >= imu.front() && t_ns <= imu.back(); });
+               [&](TimeNs t_ns) { return t_ns >= recorded.front() && t_ns <= recorded.back(); });
   std::vector<TimeNs> all;
-  std::set_union(imu.begin(), imu.end(), inside.begin(), inside.end(), std::back_inserter(all));
+  std::set_union(recorded.begin(), recorded.end(), inside.begin(), inside.end(), std::back_inserter(all));
   return all;
 }
 

@@ -14,7 +14,7 @@ struct SimulationTruth {
   std::vector<evaluation::TerrainTruth> terrain;
 };
 
-/// At the IMU's stamps and at `times`, so that nothing is interpolated there. `times` is in time order.
+/// At the simulation's truth_times() and at `times`, so that nothing is interpolated there. `times` is in time order.
 [[nodiscard]] SimulationTruth truth_of(const simulator::Simulation& simulation, const std::vector<TimeNs>& times);
 
 /// Appends one estimate of the filter.
