@@ -22,15 +22,41 @@ void Covariance::reset(const Eigen::VectorXd& sigma) {
   P_.topLeftCorner(size_, size_).diagonal() = sigma.cwiseAbs2();
 }
 
-void Covariance::propagate(const ErrorTransition& transition) {
+void Covariance::propagate(const ErrorTransition& transition, const Eigen::Matrix<double, 3, 2>& B,
+                           double normal_variance) {
   constexpr int n = err::imu_size;
   const int rest = size_ - n;
+  // delta + B^T theta is the normal's error in the world, which motion does not touch.
+  const auto add_rotation = [&](double sign) {
+    auto P = P_.topLeftCorner(size_, size_);
+    P.middleRows<2>(err::normal).noalias() += sign * B.transpose() * P.middleRows<3>(err::theta);
+    P.middleCols<2>(err::normal).noalias() += sign * P.middleCols<3>(err::theta) * B;
+  };
+  add_rotation(1.0);
   const ImuErrorMatrix PhiP = transition.Phi * P_.topLeftCorner<n, n>();
   const ImuErrorMatrix P_imu = PhiP * transition.Phi.transpose() + transition.Q;
   P_.topLeftCorner<n, n>() = 0.5 * (P_imu + P_imu.transpose());
   scratch_.leftCols(rest).noalias() = transition.Phi * P_.block(0, n, n, rest);
   P_.block(0, n, n, rest) = scratch_.leftCols(rest);
   P_.block(n, 0, rest, n) = scratch_.leftCols(rest).transpose();
+  add_rotation(-1.0);
+  P_.diagonal().segment<2>(err::normal).array() += normal_variance;
+}
+
+void Covariance::restart(int first, const Eigen::Ref<const Eigen::VectorXd>& sigma) {
+  const auto count = sigma.size();
+  P_.block(first, 0, count, size_).setZero();
+  P_.block(0, first, size_, count).setZero();
+  P_.diagonal().segment(first, count) = sigma.cwiseAbs2();
+}
+
+double Covariance::variance(const Eigen::Ref<const Eigen::RowVectorXd>& h, int first_column) const {
+  const auto n = h.size();
+  double sum = 0.0;
+  for (Eigen::Index j = 0; j < n; ++j) {
+    if (h(j) != 0.0) sum += h(j) * h.dot(P_.col(first_column + j).segment(first_column, n));
+  }
+  return sum;
 }
 
 void Covariance::append_clone(const Eigen::Matrix<double, 6, err::imu_size>& J_clone_imu,

@@ -19,8 +19,16 @@ class Covariance {
   [[nodiscard]] int size() const { return size_; }
   [[nodiscard]] Eigen::Block<const Eigen::MatrixXd> matrix() const { return P_.topLeftCorner(size_, size_); }
 
-  /// The inertial part moves on; all else stays.
-  void propagate(const ErrorTransition& transition);
+  /// The inertial part moves on; all else stays where it is in the world. So does the ground's normal, whose error is
+  /// counted from that of the body's rotation; `B`: its tangent basis. `normal_variance` [rad^2]: what the ground may
+  /// have turned meanwhile, each way.
+  void propagate(const ErrorTransition& transition, const Eigen::Matrix<double, 3, 2>& B, double normal_variance);
+
+  /// Makes the `sigma.size()` entries from `first` on unknown anew: these standard deviations, no correlations.
+  void restart(int first, const Eigen::Ref<const Eigen::VectorXd>& sigma);
+
+  /// Variance of the row h of the entries from `first_column` on.
+  [[nodiscard]] double variance(const Eigen::Ref<const Eigen::RowVectorXd>& h, int first_column) const;
 
   /// Appends J * error, J: 6 x size. Only the columns of the inertial part and of the time offset are used: a clone is
   /// taken where the vehicle is now.

@@ -6,10 +6,15 @@
 #include <stdexcept>
 #include <string>
 
+#include "filter/ground.h"
+
 namespace ear {
 namespace {
 
 constexpr std::size_t kImuCapacity = 4096;   // 20 s at 200 Hz, 4 s at 1 kHz
+constexpr std::size_t kWheelCapacity = 512;  // readings that wait for the state to pass them
+constexpr double kTooLate = 0.1;             // [s] behind the state: a reading that comes so late is not used
+constexpr double kWheelAge = 0.1;            // [s] older readings do not tell whether the wheels rest
 constexpr double kHeldSample = 0.02;         // [s] so far the newest IMU sample may stand in for one that is missing
 constexpr double kGapNoiseFactor = 10.0;     // on the noise densities while a gap in the IMU data is bridged
 constexpr double kStartGravityNoise = 0.02;  // [m/s^2] what idling rotors leave in the mean specific force
@@ -34,7 +39,7 @@ const FilterConfig& checked(const FilterConfig& config) {
 }
 
 const Calibration& checked(const Calibration& calibration) {
-  require(!calibration.cameras.empty(), "calibration: a camera is needed");
+  require(!calibration.cameras.empty() || calibration.encoder, "calibration: a camera or wheels are needed");
   require(calibration.cameras.size() <= 2, "calibration: at most two cameras");
   for (const CameraCalibration& camera : calibration.cameras) {
     require(camera.fu > 0.0 && camera.fv > 0.0, "calibration: a camera's focal lengths must be positive");
@@ -44,17 +49,52 @@ const Calibration& checked(const Calibration& calibration) {
   }
   require(calibration.imu.gyro_noise > 0.0 && calibration.imu.accel_noise > 0.0,
           "calibration: imu noise must be positive");
+  if (const auto& encoder = calibration.encoder) {
+    require(encoder->wheel_radius[0] > 0.0 && encoder->wheel_radius[1] > 0.0,
+            "calibration: wheel_radius must be positive");
+    require(encoder->wheel_separation > 0.0, "calibration: wheel_separation must be positive");
+    require(encoder->resolution > 0, "calibration: encoder resolution must be positive");
+    const Eigen::Matrix3d R = encoder->T_BO.linear();
+    require((R * R.transpose() - Eigen::Matrix3d::Identity()).norm() < 1e-3 && R.determinant() > 0.0,
+            "calibration: the encoder's T_BS holds no rotation");
+  }
+  if (const auto& lasers = calibration.lasers) {
+    require(lasers->beams.size() <= kMaxBeams, "calibration: at most three laser beams");
+    for (const LaserBeam& beam : lasers->beams) {
+      require(std::abs(beam.d_B.norm() - 1.0) < 1e-2, "calibration: a laser's direction must have length one");
+    }
+  }
   return calibration;
 }
 
 CameraState camera_state(const Calibration& calibration) {
   CameraState camera;
+  camera.time_offset = calibration.camera_time_offset;
+  if (calibration.cameras.empty()) return camera;
   const Eigen::Isometry3d& T_BC0 = calibration.cameras.front().T_BC;
   camera.T_BC0 = {renormalized(T_BC0.linear()), T_BC0.translation()};
   const Eigen::Isometry3d T_C0C1 = T_BC0.inverse() * calibration.cameras.back().T_BC;
   camera.T_C0C1 = {renormalized(T_C0C1.linear()), T_C0C1.translation()};
-  camera.time_offset = calibration.camera_time_offset;
   return camera;
+}
+
+OdometerState odometer_state(const Calibration& calibration) {
+  OdometerState odometer;
+  if (const auto& encoder = calibration.encoder) {
+    odometer.wheel_radius << encoder->wheel_radius[0], encoder->wheel_radius[1];
+    odometer.wheel_separation = encoder->wheel_separation;
+    odometer.T_BO = {renormalized(encoder->T_BO.linear()), encoder->T_BO.translation()};
+  }
+  if (const auto& lasers = calibration.lasers) {
+    for (std::size_t i = 0; i < lasers->beams.size(); ++i) odometer.d_B[i] = lasers->beams[i].d_B.normalized();
+  }
+  return odometer;
+}
+
+/// Pixels per unit of normalized coordinates; 1 without a camera, where nothing is measured in pixels.
+double focal_length(const Calibration& calibration) {
+  if (calibration.cameras.empty()) return 1.0;
+  return 0.5 * (calibration.cameras[0].fu + calibration.cameras[0].fv);
 }
 
 }  // namespace
@@ -62,19 +102,30 @@ CameraState camera_state(const Calibration& calibration) {
 Filter::Filter(const FilterConfig& config, const Calibration& calibration)
     : config_(checked(config)),
       calibration_(checked(calibration)),
-      focal_px_(0.5 * (calibration.cameras[0].fu + calibration.cameras[0].fv)),
+      focal_px_(focal_length(calibration)),
+      beam_count_(calibration.lasers ? static_cast<int>(calibration.lasers->beams.size()) : 0),
       gate_(config.gate_probability, 4 * (config.window + 1)),
       covariance_(error_capacity(config)),
       imu_(kImuCapacity),
+      turns_(kWheelCapacity),
+      ranges_(kWheelCapacity),
       standstill_(config.standstill, focal_px_),
       information_(config.window + 1, config.max_track_updates) {
   state_.camera = camera_state(calibration);
+  state_.odometer = odometer_state(calibration);
+  if (calibration.encoder && config.odometer.model != OdometerModel::none) encoder_.emplace(*calibration.encoder);
   state_.clones.reserve(static_cast<std::size_t>(config.window) + 1);
 }
 
 TimeNs Filter::imu_time(TimeNs camera_time_ns) const {
   return camera_time_ns + static_cast<TimeNs>(std::llround(1e9 * state_.camera.time_offset));
 }
+
+TimeNs Filter::camera_time(TimeNs imu_time_ns) const {
+  return imu_time_ns - static_cast<TimeNs>(std::llround(1e9 * state_.camera.time_offset));
+}
+
+bool Filter::is_next(TimeNs t_ns) const { return !any_frame_ || t_ns > last_frame_ns_; }
 
 bool Filter::covers(TimeNs t_ns) const {
   return !imu_.empty() && seconds_between(imu_.newest().t_ns, imu_time(t_ns)) < kHeldSample;
@@ -83,10 +134,10 @@ bool Filter::covers(TimeNs t_ns) const {
 void Filter::add_imu(const ImuSample& sample) {
   const bool finite = sample.gyro_B.allFinite() && sample.accel_B.allFinite();
   if (!finite || (!imu_.empty() && sample.t_ns <= imu_.newest().t_ns)) {
-    ++imu_counts_.rejected;
+    ++counts_.imu_rejected;
     return;
   }
-  if (!imu_.empty() && seconds_between(imu_.newest().t_ns, sample.t_ns) > config_.max_imu_gap) ++imu_counts_.gaps;
+  if (!imu_.empty() && seconds_between(imu_.newest().t_ns, sample.t_ns) > config_.max_imu_gap) ++counts_.imu_gaps;
   // Without frames for long, the state moves on before its samples are overwritten.
   if (status_ == Status::tracking && imu_.size() == kImuCapacity && state_.imu.t_ns < imu_[kImuCapacity / 2].t_ns) {
     advance(imu_[kImuCapacity / 2].t_ns);
@@ -94,27 +145,100 @@ void Filter::add_imu(const ImuSample& sample) {
   imu_.push(sample);
 }
 
+void Filter::add_encoder(const EncoderSample& sample) {
+  if (!encoder_) return;
+  if (encoder_->any() && sample.t_ns <= encoder_->last_ns()) {
+    ++counts_.encoder_rejected;
+    return;
+  }
+  const std::optional<WheelTurn> turn = encoder_->add(sample);
+  if (!turn) return;
+  wheel_rest_.add(*turn);
+  if (status_ != Status::tracking) return;
+  if (seconds_between(turn->to_ns, state_.imu.t_ns) > kTooLate) {
+    ++counts_.encoder_rejected;
+    return;
+  }
+  if (turns_.full()) advance_measuring(turns_.front().to_ns);  // no frames for long
+  turns_.push(*turn);
+}
+
+void Filter::add_laser(const LaserSample& sample) {
+  if (!encoder_ || beam_count_ == 0) return;
+  const bool usable = sample.t_ns > last_range_ns_ && static_cast<int>(sample.range.size()) == beam_count_;
+  if (!usable || (status_ == Status::tracking && seconds_between(sample.t_ns, state_.imu.t_ns) > kTooLate)) {
+    ++counts_.laser_rejected;
+    return;
+  }
+  last_range_ns_ = sample.t_ns;
+  if (status_ != Status::tracking) return;
+  if (ranges_.full()) advance_measuring(ranges_.front().t_ns);
+  BeamRanges reading;
+  reading.t_ns = sample.t_ns;
+  std::copy(sample.range.begin(), sample.range.end(), reading.range.begin());
+  ranges_.push(reading);
+}
+
 std::optional<RelativeMotion> Filter::motion_to(TimeNs t_ns) const {
-  if (!any_frame_ || imu_.empty() || t_ns <= last_frame_ns_) return std::nullopt;
+  if (!any_image_ || imu_.empty() || t_ns <= last_image_ns_) return std::nullopt;
   RelativeMotion motion;
   if (status_ != Status::tracking) {
     Eigen::Matrix3d R_B0B1 = Eigen::Matrix3d::Identity();
     imu_.for_each_piece(
-        imu_time(last_frame_ns_), imu_time(t_ns),
+        imu_time(last_image_ns_), imu_time(t_ns),
         [&](const Eigen::Vector3d& gyro_B, const Eigen::Vector3d&, double dt) { R_B0B1 *= exp_so3(gyro_B * dt); });
     motion.R_B1B0 = R_B0B1.transpose();
     return motion;
   }
   const std::optional<NavState> next = predict(imu_time(t_ns));
-  const Eigen::Matrix3d R_B0W = state_.imu.R_WB.transpose();
-  motion.R_B1B0 = next->q_WB.toRotationMatrix().transpose() * state_.imu.R_WB;
-  motion.p_B0B1 = R_B0W * (next->p_WB - state_.imu.p_WB);
+  motion.R_B1B0 = next->q_WB.toRotationMatrix().transpose() * image_T_WB_.R;
+  motion.p_B0B1 = image_T_WB_.R.transpose() * (next->p_WB - image_T_WB_.p);
   motion.translation_known = true;
   return motion;
 }
 
 std::optional<Estimate> Filter::process(const FeatureFrame& frame) {
-  if (!covers(frame.t_ns) || (any_frame_ && frame.t_ns <= last_frame_ns_)) return std::nullopt;
+  if (!covers(frame.t_ns) || !is_next(frame.t_ns)) return std::nullopt;
+  any_image_ = true;
+  last_image_ns_ = frame.t_ns;
+  const bool still = begin_frame(frame);
+  if (status_ != Status::tracking) return std::nullopt;
+
+  if (still && clone_is_here_) {
+    hold_still();
+  } else {
+    append_clone();
+    tracks_.add(state_.clones.back().frame, frame.features);
+    const std::optional<std::size_t> leaving = clone_to_leave();
+    update_with_features(frame, leaving);
+    make_room(leaving);
+  }
+  image_T_WB_ = {state_.imu.R_WB, state_.imu.p_WB};
+  statistics_.clones = static_cast<int>(state_.clones.size());
+  return make_estimate();
+}
+
+std::optional<Estimate> Filter::process_without_image(TimeNs t_ns) {
+  if (!covers(t_ns) || !is_next(t_ns)) return std::nullopt;
+  FeatureFrame nothing;
+  nothing.t_ns = t_ns;
+  const bool still = begin_frame(nothing);
+  if (status_ != Status::tracking) return std::nullopt;
+
+  if (still && clone_is_here_) {
+    hold_still();
+  } else if (still) {
+    append_clone();
+    make_room(clone_to_leave());
+  } else {
+    clone_is_here_ = false;
+  }
+  statistics_.clones = static_cast<int>(state_.clones.size());
+  return make_estimate();
+}
+
+/// What comes before anything is done with the features: start if possible, propagate. Does the vehicle stand?
+bool Filter::begin_frame(const FeatureFrame& frame) {
   any_frame_ = true;
   last_frame_ns_ = frame.t_ns;
   statistics_ = FrameStatistics{};
@@ -126,52 +250,26 @@ std::optional<Estimate> Filter::process(const FeatureFrame& frame) {
   const bool started = status_ == Status::tracking;
   const ImuStatistics imu = imu_.statistics(t_ns - static_cast<TimeNs>(1e9 * config_.standstill.duration), t_ns);
   const bool still = standstill_.update(frame, imu, started ? state_.imu.b_g : Eigen::Vector3d::Zero(),
-                                        started ? config_.standstill.max_gyro : config_.standstill.max_gyro_at_start);
-  if (!started && !try_start(frame, imu, still)) return std::nullopt;
-
-  advance(t_ns);
-  if (still && !state_.clones.empty()) {
-    hold_still();
-  } else {
-    append_clone();
-    tracks_.add(state_.clones.back().frame, frame.features);
-    update_with_features(frame);
-  }
-  statistics_.clones = static_cast<int>(state_.clones.size());
-  return make_estimate();
+                                        started ? config_.standstill.max_gyro : config_.standstill.max_gyro_at_start,
+                                        wheel_rest_.duration(t_ns, kWheelAge));
+  if (started || try_start(t_ns, imu, still)) advance_measuring(t_ns);
+  return still;
 }
 
 /// Standing: the mean specific force is gravity, the mean rate is the gyroscope's bias.
-bool Filter::try_start(const FeatureFrame& frame, const ImuStatistics& imu, bool still) {
+bool Filter::try_start(TimeNs t_ns, const ImuStatistics& imu, bool still) {
   status_ = imu.count < 2 ? Status::waiting_for_imu : Status::waiting_for_standstill;
   if (!still) return false;
 
   ImuState& x = state_.imu;
   x = ImuState{};
-  x.t_ns = imu_time(frame.t_ns);
+  x.t_ns = t_ns;
   x.R_WB = Eigen::Quaterniond::FromTwoVectors(imu.accel_mean, Eigen::Vector3d::UnitZ()).toRotationMatrix();
   x.b_g = imu.gyro_mean;
   // What the force measures beyond gravity's known size can only be bias.
   const Eigen::Vector3d gravity_B = -(x.R_WB.transpose() * kGravity_W);
 
-  const OnlineCalibrationConfig& online = config_.online_calibration;
-  const PriorConfig& prior = config_.prior;
-  Eigen::VectorXd sigma = Eigen::VectorXd::Zero(err::clones);
-  sigma.segment<3>(err::theta) << kUnknownTilt, kUnknownTilt, kKnownSigma;
-  sigma.segment<3>(err::nu).setConstant(config_.standstill.velocity_sigma);
-  sigma.segment<3>(err::rho).setConstant(kKnownSigma);
-  sigma.segment<3>(err::b_g).setConstant(prior.gyro_bias);
-  sigma.segment<3>(err::b_a).setConstant(prior.accel_bias);
-  if (online.camera_extrinsics) {
-    sigma.segment<3>(err::camera).setConstant(prior.camera_rotation);
-    sigma.segment<3>(err::camera + 3).setConstant(prior.camera_position);
-    if (calibration_.cameras.size() == 2) {
-      sigma.segment<3>(err::stereo).setConstant(prior.stereo_rotation);
-      sigma.segment<3>(err::stereo + 3).setConstant(prior.stereo_position);
-    }
-  }
-  if (online.time_offset) sigma(err::time_offset) = prior.time_offset;
-  covariance_.reset(sigma);
+  covariance_.reset(start_sigma());
   status_ = Status::tracking;
 
   // force = R^T (-g) + b_a + n, rate = b_g + n; with the invariant error, R^T u = R^^T (u + [u]x theta).
@@ -189,9 +287,39 @@ bool Filter::try_start(const FeatureFrame& frame, const ImuStatistics& imu, bool
   return true;
 }
 
+/// Standard deviations of the whole error vector before gravity and biases were measured.
+Eigen::VectorXd Filter::start_sigma() const {
+  const OnlineCalibrationConfig& online = config_.online_calibration;
+  const PriorConfig& prior = config_.prior;
+  Eigen::VectorXd sigma = Eigen::VectorXd::Zero(err::clones);
+  sigma.segment<3>(err::theta) << kUnknownTilt, kUnknownTilt, kKnownSigma;
+  sigma.segment<3>(err::nu).setConstant(config_.standstill.velocity_sigma);
+  sigma.segment<3>(err::rho).setConstant(kKnownSigma);
+  sigma.segment<3>(err::b_g).setConstant(prior.gyro_bias);
+  sigma.segment<3>(err::b_a).setConstant(prior.accel_bias);
+  if (online.camera_extrinsics && !calibration_.cameras.empty()) {
+    sigma.segment<3>(err::camera).setConstant(prior.camera_rotation);
+    sigma.segment<3>(err::camera + 3).setConstant(prior.camera_position);
+    if (calibration_.cameras.size() == 2) {
+      sigma.segment<3>(err::stereo).setConstant(prior.stereo_rotation);
+      sigma.segment<3>(err::stereo + 3).setConstant(prior.stereo_position);
+    }
+  }
+  if (online.time_offset && !calibration_.cameras.empty()) sigma(err::time_offset) = prior.time_offset;
+  if (encoder_) {
+    sigma.segment<2>(err::normal).setConstant(config_.odometer.normal_prior);
+    if (online.wheels) sigma.segment<2>(err::wheel_radius).setConstant(prior.wheel_radius);
+    if (online.wheels) sigma(err::wheel_separation) = prior.wheel_separation;
+    if (online.odometer_rotation) sigma.segment<3>(err::odometer).setConstant(prior.odometer_rotation);
+    if (online.beam_tilt) sigma.segment(err::beams, beam_count_).setConstant(prior.beam_tilt);
+  }
+  return sigma;
+}
+
 void Filter::advance(TimeNs t_ns) {
   if (t_ns <= state_.imu.t_ns) return;
   ErrorTransition total;
+  const double duration = seconds_between(state_.imu.t_ns, t_ns);
   imu_.for_each_piece(state_.imu.t_ns, t_ns,
                       [&](const Eigen::Vector3d& gyro_B, const Eigen::Vector3d& accel_B, double dt) {
                         ImuCalibration noise = calibration_.imu;
@@ -204,7 +332,133 @@ void Filter::advance(TimeNs t_ns) {
                         rate_B_ = gyro_B - state_.imu.b_g;
                       });
   state_.imu.t_ns = t_ns;
-  covariance_.propagate(total);
+  const double walk = config_.odometer.normal_walk;
+  const double distance = encoder_ ? state_.imu.v_W.norm() * duration : 0.0;
+  covariance_.propagate(total, tangent_basis(state_.ground.n_W), walk * walk * distance);
+}
+
+/// Propagates to t_ns, taking in wheels and lasers on the way: each at its own time, or, if the state has passed that
+/// already, where the state was then.
+void Filter::advance_measuring(TimeNs t_ns) {
+  while (!turns_.empty() || !ranges_.empty()) {
+    const auto middle = [](const WheelTurn& turn) { return turn.from_ns + (turn.to_ns - turn.from_ns) / 2; };
+    const bool wheels_next =
+        !turns_.empty() && (ranges_.empty() || middle(turns_.front()) < ranges_.front().t_ns);
+    const TimeNs next_ns = wheels_next ? middle(turns_.front()) : ranges_.front().t_ns;
+    if (next_ns > t_ns) break;
+    advance(next_ns);
+    if (wheels_next) {
+      update_with_wheels(turns_.front());
+      turns_.pop();
+    } else {
+      update_with_beams(ranges_.front());
+      ranges_.pop();
+    }
+  }
+  advance(t_ns);
+}
+
+Filter::Motion Filter::motion_at(TimeNs t_ns) const {
+  const ImuState& x = state_.imu;
+  Motion motion{x.R_WB, x.v_W};
+  if (t_ns >= x.t_ns) return motion;
+  Eigen::Matrix3d turned = Eigen::Matrix3d::Identity();  // from the body then to the body now
+  Eigen::Vector3d gained = Eigen::Vector3d::Zero();      // velocity, in the body then, without gravity
+  imu_.for_each_piece(t_ns, x.t_ns, [&](const Eigen::Vector3d& gyro_B, const Eigen::Vector3d& accel_B, double dt) {
+    gained += turned * (accel_B - x.b_a) * dt;
+    turned *= exp_so3((gyro_B - x.b_g) * dt);
+  });
+  motion.R_WB = x.R_WB * turned.transpose();
+  motion.v_W = x.v_W - kGravity_W * seconds_between(t_ns, x.t_ns) - motion.R_WB * gained;
+  return motion;
+}
+
+void Filter::update_with_wheels(const WheelTurn& turn) {
+  const OdometerConfig& odometer = config_.odometer;
+  const double dt = turn.duration();
+  const Motion motion = motion_at(turn.from_ns + (turn.to_ns - turn.from_ns) / 2);
+  Eigen::Vector3d turned_B = Eigen::Vector3d::Zero();
+  imu_.for_each_piece(turn.from_ns, turn.to_ns,
+                      [&](const Eigen::Vector3d& gyro_B, const Eigen::Vector3d&, double d) { turned_B += gyro_B * d; });
+  const WheelRows rows =
+      linearize_wheels(state_, motion.R_WB, motion.v_W, turn, turned_B / dt, odometer.model, beam_count_ > 0);
+
+  const double per_root_metre = std::sqrt(std::abs(rows.wheel_speed) / dt);
+  const double yaw_rate = (turned_B / dt - state_.imu.b_g).norm();
+  const double gyro_noise = calibration_.imu.gyro_noise / std::sqrt(dt);
+  const double count_noise = std::sqrt(2.0) * calibration_.encoder->noise_counts * 2.0 * M_PI /
+                             static_cast<double>(calibration_.encoder->resolution) / dt *
+                             state_.odometer.wheel_radius.mean() / std::sqrt(2.0);
+  const auto root_sum = [&](int row, double a, double b, double c) {
+    const double gyro = gyro_noise * rows.J_gyro.row(row).norm();
+    return std::sqrt(a * a + b * b + c * c + gyro * gyro);
+  };
+  Eigen::Matrix<double, WheelRows::size, 1> sigma;
+  sigma << root_sum(WheelRows::speed, odometer.speed_sigma, odometer.slip * per_root_metre, count_noise),
+      root_sum(WheelRows::side, odometer.speed_sigma, odometer.side_slip * per_root_metre,
+               odometer.side_slip_turn * yaw_rate),
+      root_sum(WheelRows::slope, odometer.speed_sigma, odometer.roughness * per_root_metre, 0.0),
+      root_sum(WheelRows::yaw_rate, odometer.yaw_rate_sigma, count_noise * 2.0 / state_.odometer.wheel_separation, 0.0);
+
+  const bool use_yaw_rate = odometer.model == OdometerModel::differential || odometer.yaw_rate;
+  const bool slope_known = odometer.model != OdometerModel::terrain || beam_count_ == 0 || ground_known_;
+  std::array<bool, WheelRows::size> use = {true, true, slope_known, use_yaw_rate};
+  Eigen::Matrix<double, WheelRows::size, kGroundColumns> H;
+  Eigen::Matrix<double, WheelRows::size, 1> r;
+  int count = 0;
+  for (int row = 0; row < WheelRows::size; ++row) {
+    if (!use[static_cast<std::size_t>(row)]) continue;
+    const double variance = covariance_.variance(rows.H.row(row), err::nu) + sigma(row) * sigma(row);
+    if (!(rows.residual(row) * rows.residual(row) <= gate_(1) * variance)) {
+      ++statistics_.wheel_rows_rejected;
+      continue;
+    }
+    ++statistics_.wheel_rows_used;
+    H.row(count) = rows.H.row(row) / sigma(row);
+    r(count++) = rows.residual(row) / sigma(row);
+  }
+  if (count > 0) update(H.topRows(count), err::nu, r.head(count));
+}
+
+void Filter::update_with_beams(const BeamRanges& reading) {
+  if (config_.odometer.model != OdometerModel::terrain) return;
+  const LaserCalibration& lasers = *calibration_.lasers;
+  const Motion motion = motion_at(reading.t_ns);
+  if (!ground_known_) restart_ground(reading, motion.R_WB);
+  const double sigma = std::hypot(lasers.noise, config_.odometer.unevenness);
+  Eigen::Matrix<double, kMaxBeams, kGroundColumns> H = Eigen::Matrix<double, kMaxBeams, kGroundColumns>::Zero();
+  Eigen::Matrix<double, kMaxBeams, 1> r;
+  int count = 0;
+  for (int i = 0; i < beam_count_; ++i) {
+    const auto beam = static_cast<std::size_t>(i);
+    const double range = reading.range[beam];
+    if (!(range >= lasers.range_min && range <= lasers.range_max)) continue;
+    const BeamPrediction z = predict_range(state_, motion.R_WB, beam, lasers.beams[beam].p_BL);
+    auto h = H.row(count);
+    h.setZero();
+    h.segment<2>(ground_column(err::normal)) = z.H_normal;
+    h(ground_column(err::beams) + i) = z.H_tilt;
+    const double residual = range - z.range;
+    if (!(residual * residual <= gate_(1) * (covariance_.variance(h, err::nu) + sigma * sigma))) {
+      ++statistics_.beams_rejected;
+      continue;
+    }
+    ++statistics_.beams_used;
+    h /= sigma;
+    r(count++) = residual / sigma;
+  }
+  if (count > 0) update(H.topRows(count), err::nu, r.head(count));
+}
+
+/// Where nothing is known of the ground, the plane through the hits is where the linearization starts.
+void Filter::restart_ground(const BeamRanges& reading, const Eigen::Matrix3d& R_WB) {
+  const Eigen::Vector3d range(reading.range[0], reading.range[1], reading.range[2]);
+  const std::optional<GroundPlane> plane =
+      plane_through_hits(calibration_.lasers->beams, range, state_.odometer.T_BO.p);
+  if (!plane) return;
+  state_.ground.n_W = (R_WB * plane->n_B).normalized();
+  covariance_.restart(err::normal, Eigen::Vector2d::Constant(config_.odometer.normal_prior));
+  ground_known_ = true;
 }
 
 /// The vehicle is where it was at the newest clone, and its velocity is zero. docs/filter.md, section 4.
@@ -244,10 +498,17 @@ void Filter::append_clone() {
   covariance_.append_clone(J_imu, J_offset);
   state_.clones.push_back({next_frame_++, {x.R_WB, x.p_WB}});
   learn_calibration_ = true;
+  clone_is_here_ = true;
 }
 
-void Filter::update_with_features(const FeatureFrame& frame) {
-  const std::optional<std::size_t> leaving = clone_to_leave();
+void Filter::make_room(std::optional<std::size_t> leaving) {
+  if (!leaving) return;
+  tracks_.forget_frame(state_.clones[*leaving].frame);
+  covariance_.remove(err::clone(static_cast<int>(*leaving)), err::clone_size);
+  state_.clones.erase(state_.clones.begin() + static_cast<std::ptrdiff_t>(*leaving));
+}
+
+void Filter::update_with_features(const FeatureFrame& frame, std::optional<std::size_t> leaving) {
   const bool oldest_leaves = leaving && *leaving == 0;
   select_tracks(frame, oldest_leaves ? std::optional(state_.clones.front().frame) : std::nullopt);
 
@@ -260,15 +521,10 @@ void Filter::update_with_features(const FeatureFrame& frame) {
   information_.compress();
   if (information_.residual().size() > 0) update(information_.H(), err::camera, information_.residual());
 
-  // Features that ended, used or not, are forgotten; so is the clone that makes room.
+  // Features that ended, used or not, are forgotten.
   tracks_.keep_if([&](const Track& track) {
     return !track.observations.empty() && std::binary_search(frame_ids_.begin(), frame_ids_.end(), track.id);
   });
-  if (leaving) {
-    tracks_.forget_frame(state_.clones[*leaving].frame);
-    covariance_.remove(err::clone(static_cast<int>(*leaving)), err::clone_size);
-    state_.clones.erase(state_.clones.begin() + static_cast<std::ptrdiff_t>(*leaving));
-  }
 }
 
 /// Tracks that ended with this frame, and those that reach back to the clone that leaves; the longest first.
@@ -380,6 +636,16 @@ Estimate Filter::make_estimate() const {
   T.block<3, 3>(estimate_error::position, err::theta) = -skew(x.p_WB);
   estimate.covariance = T * covariance_.matrix().topLeftCorner<err::imu_size, err::imu_size>() * T.transpose();
   estimate.frame = statistics_;
+  if (ground_known_) {
+    const Slope ground = slope(x.R_WB * state_.odometer.T_BO.R.col(1), state_.ground.n_W);
+    constexpr std::array<int, 5> kEntries = {err::theta, err::theta + 1, err::theta + 2, err::normal, err::normal + 1};
+    Eigen::Matrix<double, 5, 5> P;
+    for (int i = 0; i < 5; ++i) {
+      for (int j = 0; j < 5; ++j) P(i, j) = covariance_.matrix()(kEntries[i], kEntries[j]);
+    }
+    const Eigen::Matrix2d P_slope = ground.J * P * ground.J.transpose();
+    estimate.terrain = {true, ground.along, ground.across, std::sqrt(P_slope(0, 0)), std::sqrt(P_slope(1, 1))};
+  }
   return estimate;
 }
 

@@ -1,10 +1,12 @@
-// The estimator: inertial samples and feature tracks in, state and covariance out. An MSCKF with right-invariant error.
+// The estimator: inertial samples, wheel and laser readings and feature tracks in, state and covariance out. An MSCKF
+// with right-invariant error.
 //
-// Per frame (Filter::process): propagate to the frame's time; if the vehicle stands, hold it; else clone the pose, take
-// in the frame's observations, update once with all features that ended or fill the window, and make room in the
-// window.
+// Per frame (Filter::process): propagate to the frame's time, taking in wheels and lasers on the way, each at its own
+// time; if the vehicle stands, hold it; else clone the pose, take in the frame's observations, update once with all
+// features that ended or fill the window, and make room in the window.
 #pragma once
 
+#include <array>
 #include <optional>
 #include <vector>
 
@@ -16,9 +18,11 @@
 #include "filter/covariance.h"
 #include "filter/feature_update.h"
 #include "filter/imu_buffer.h"
+#include "filter/ring.h"
 #include "filter/standstill.h"
 #include "filter/state.h"
 #include "filter/tracks.h"
+#include "filter/wheels.h"
 
 namespace ear {
 
@@ -29,12 +33,6 @@ struct RelativeMotion {
   bool translation_known = false;
 };
 
-/// What IMU-side problems there were; see InputCounts.
-struct ImuCounts {
-  std::uint64_t rejected = 0;
-  std::uint64_t gaps = 0;
-};
-
 class Filter {
  public:
   /// Throws std::invalid_argument, naming the field, if a setting or the calibration is unusable.
@@ -43,6 +41,11 @@ class Filter {
   /// Takes a sample in time order. One that is not finite, or not later than the one before, is refused and counted.
   void add_imu(const ImuSample& sample);
 
+  /// Takes a reading in time order; it is used at its own time when the state passes it. One that is not later than the
+  /// one before, or far behind the state, is refused and counted. Without a calibration of its sensor it is ignored.
+  void add_encoder(const EncoderSample& sample);
+  void add_laser(const LaserSample& sample);
+
   /// How the body moved from the last processed frame to a frame stamped `t_ns`: for a front end to track with. Before
   /// the start only the rotation is known. Nothing if no frame came yet, or no samples.
   [[nodiscard]] std::optional<RelativeMotion> motion_to(TimeNs t_ns) const;
@@ -50,22 +53,46 @@ class Filter {
   /// Takes the features of one frame. The estimate at the frame's time, or nothing while it cannot start.
   std::optional<Estimate> process(const FeatureFrame& frame);
 
+  /// The same at a time without an image, from all other sensors; a camera's stamp. Tracks go on over it.
+  std::optional<Estimate> process_without_image(TimeNs t_ns);
+
   /// The newest state carried on by the samples to `t_ns` (IMU time). Nothing before the start.
   [[nodiscard]] std::optional<NavState> predict(TimeNs t_ns) const;
 
   [[nodiscard]] Status status() const { return status_; }
-  [[nodiscard]] const ImuCounts& imu_counts() const { return imu_counts_; }
-  [[nodiscard]] bool covers(TimeNs t_ns) const;  ///< are there inertial samples (nearly) up to the frame's time?
+  [[nodiscard]] const InputCounts& input_counts() const { return counts_; }  ///< of samples; frames are the caller's
+  [[nodiscard]] bool covers(TimeNs t_ns) const;   ///< are there inertial samples (nearly) up to the frame's time?
+  [[nodiscard]] bool is_next(TimeNs t_ns) const;  ///< is a frame with this stamp later than the one before?
+  [[nodiscard]] TimeNs camera_time(TimeNs imu_time_ns) const;  ///< the stamp that the camera has at that time
   [[nodiscard]] const State& state() const { return state_; }
   [[nodiscard]] const Covariance& covariance() const { return covariance_; }
 
  private:
+  /// Ranges of one reading; NaN without return.
+  struct BeamRanges {
+    TimeNs t_ns = 0;
+    std::array<double, kMaxBeams> range{};
+  };
+  /// Attitude and velocity at a time near the state's.
+  struct Motion {
+    Eigen::Matrix3d R_WB;
+    Eigen::Vector3d v_W;
+  };
+
   [[nodiscard]] TimeNs imu_time(TimeNs camera_time_ns) const;
-  bool try_start(const FeatureFrame& frame, const ImuStatistics& imu, bool still);
+  bool try_start(TimeNs t_ns, const ImuStatistics& imu, bool still);
+  [[nodiscard]] Eigen::VectorXd start_sigma() const;
+  bool begin_frame(const FeatureFrame& frame);
   void advance(TimeNs t_ns);
+  void advance_measuring(TimeNs t_ns);
+  [[nodiscard]] Motion motion_at(TimeNs t_ns) const;
+  void update_with_wheels(const WheelTurn& turn);
+  void update_with_beams(const BeamRanges& reading);
+  void restart_ground(const BeamRanges& reading, const Eigen::Matrix3d& R_WB);
   void hold_still();
   void append_clone();
-  void update_with_features(const FeatureFrame& frame);
+  void make_room(std::optional<std::size_t> leaving);
+  void update_with_features(const FeatureFrame& frame, std::optional<std::size_t> leaving);
   bool add_track(const Track& track);
   void select_tracks(const FeatureFrame& frame, std::optional<std::uint64_t> leaving);
   [[nodiscard]] std::optional<std::size_t> clone_to_leave() const;
@@ -76,20 +103,31 @@ class Filter {
 
   FilterConfig config_;
   Calibration calibration_;
-  double focal_px_;
+  double focal_px_ = 0.0;  ///< of the first camera, for thresholds in pixels
+  int beam_count_ = 0;
   ChiSquaredGate gate_;
 
   Status status_ = Status::waiting_for_imu;
   State state_;
   Covariance covariance_;
   ImuBuffer imu_;
-  ImuCounts imu_counts_;
+  InputCounts counts_;
   Eigen::Vector3d rate_B_ = Eigen::Vector3d::Zero();  ///< mean rate of the last piece integrated, bias removed [rad/s]
+  std::optional<EncoderReader> encoder_;
+  Ring<WheelTurn> turns_;        ///< not yet passed by the state
+  Ring<BeamRanges> ranges_;      ///< the same
+  TimeNs last_range_ns_ = 0;
+  bool ground_known_ = false;    ///< the lasers saw the ground since it was last touched
+  WheelRest wheel_rest_;
   StandstillDetector standstill_;
   TrackTable tracks_;
   std::uint64_t next_frame_ = 0;
   TimeNs last_frame_ns_ = 0;  ///< camera stamp of the last frame processed
   bool any_frame_ = false;
+  Pose image_T_WB_;           ///< body at the last image
+  TimeNs last_image_ns_ = 0;  ///< its camera stamp
+  bool any_image_ = false;
+  bool clone_is_here_ = false;  ///< the newest clone was made where the vehicle is, if it stands
   bool learn_calibration_ = false;  ///< standing tells nothing about it
   FrameStatistics statistics_;
 

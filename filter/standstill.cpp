@@ -2,19 +2,38 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace ear {
 namespace {
 constexpr std::size_t kMinCommonFeatures = 8;  // fewer do not tell motion from mismatches
+constexpr double kNoRest = 0.05;               // [s] wheels that turned so lately turn
+constexpr double kWheelPlay = 0.005;           // [rad] that a wheel at rest may turn: 0.4 mm of its rim
+}  // namespace
+
+void WheelRest::add(const WheelTurn& turn) {
+  moved_ += turn.angle;
+  if (!any_ || turn.from_ns != newest_ns_ || moved_.cwiseAbs().maxCoeff() > kWheelPlay) {
+    since_ns_ = turn.to_ns;
+    moved_.setZero();
+  }
+  any_ = true;
+  newest_ns_ = turn.to_ns;
+}
+
+std::optional<double> WheelRest::duration(TimeNs t_ns, double max_age) const {
+  if (!any_ || seconds_between(newest_ns_, t_ns) > max_age) return std::nullopt;
+  return seconds_between(since_ns_, newest_ns_);
 }
 
 bool StandstillDetector::update(const FeatureFrame& frame, const ImuStatistics& imu, const Eigen::Vector3d& gyro_bias,
-                                double max_gyro) {
+                                double max_gyro, std::optional<double> wheel_rest) {
   const bool imu_quiet = imu.duration > 0.8 * config_.duration && imu.gyro_spread < config_.max_gyro_spread &&
                          imu.accel_spread < config_.max_accel_spread && (imu.gyro_mean - gyro_bias).norm() < max_gyro;
   const double max_flow_px = standing_ ? config_.leave_flow_px : config_.max_flow_px;
-  if (!imu_quiet || since_ns_ == kMoving || common_flow_px(frame) > max_flow_px) {
+  const std::optional<double> flow_px = common_flow_px(frame);
+  const bool known = flow_px || wheel_rest;
+  const bool moved = (flow_px && *flow_px > max_flow_px) || (wheel_rest && *wheel_rest < kNoRest);
+  if (!imu_quiet || since_ns_ == kMoving || !known || moved) {
     restart(frame);
     return false;
   }
@@ -53,8 +72,8 @@ void StandstillDetector::restart(const FeatureFrame& frame) {
 }
 
 /// A shift, an expansion and a turn of the image each move the median of one component, which noise of single features
-/// does not. The largest of the four medians.
-double StandstillDetector::common_flow_px(const FeatureFrame& frame) {
+/// does not. The largest of the four medians; nothing if too few features are common.
+std::optional<double> StandstillDetector::common_flow_px(const FeatureFrame& frame) {
   for (auto& component : flow_) component.clear();
   for (const FeatureObservation& feature : frame.features) {
     const FeatureObservation* const match = find_in_reference(feature.id);
@@ -66,7 +85,7 @@ double StandstillDetector::common_flow_px(const FeatureFrame& frame) {
     flow_[2].push_back(outward.dot(flow));
     flow_[3].push_back(outward.x() * flow.y() - outward.y() * flow.x());
   }
-  if (flow_[0].size() < kMinCommonFeatures) return std::numeric_limits<double>::infinity();
+  if (flow_[0].size() < kMinCommonFeatures) return std::nullopt;
   double largest = 0.0;
   for (auto& component : flow_) {
     const auto middle = component.begin() + static_cast<std::ptrdiff_t>(component.size() / 2);

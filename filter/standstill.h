@@ -1,15 +1,32 @@
-// Does the vehicle stand? The IMU must be quiet and the features must stay where they were when it stopped: a vehicle
-// that glides at constant speed has a quiet IMU too.
+// Does the vehicle stand? The IMU must be quiet, and the features must stay where they were when it stopped, or the
+// wheels must not turn: a vehicle that glides at constant speed has a quiet IMU too.
 #pragma once
 
 #include <array>
+#include <optional>
 #include <vector>
 
 #include "ear/filter_config.h"
 #include "ear/types.h"
 #include "filter/imu_buffer.h"
+#include "filter/wheels.h"
 
 namespace ear {
+
+/// Since when have the wheels not turned relative to the body?
+class WheelRest {
+ public:
+  void add(const WheelTurn& turn);
+  /// Do they rest now, and since when? Nothing if the newest reading is older than `max_age` seconds before t_ns.
+  [[nodiscard]] std::optional<double> duration(TimeNs t_ns, double max_age) const;
+  void clear() { any_ = false; }
+
+ private:
+  bool any_ = false;
+  TimeNs since_ns_ = 0;
+  TimeNs newest_ns_ = 0;
+  Eigen::Vector2d moved_ = Eigen::Vector2d::Zero();  // since since_ns_ [rad]
+};
 
 class StandstillDetector {
  public:
@@ -17,8 +34,10 @@ class StandstillDetector {
   StandstillDetector(const StandstillConfig& config, double focal_px) : config_(config), focal_px_(focal_px) {}
 
   /// Looks at one frame. `imu`: the samples of the last config.duration seconds. `gyro_bias` [rad/s]; `max_gyro`
-  /// [rad/s]: how far the mean rate may be from it. True if the vehicle has stood for config.duration.
-  bool update(const FeatureFrame& frame, const ImuStatistics& imu, const Eigen::Vector3d& gyro_bias, double max_gyro);
+  /// [rad/s]: how far the mean rate may be from it. `wheel_rest`: for how long the wheels have not turned [s], nothing
+  /// where they tell nothing. True if the vehicle has stood for config.duration.
+  bool update(const FeatureFrame& frame, const ImuStatistics& imu, const Eigen::Vector3d& gyro_bias, double max_gyro,
+              std::optional<double> wheel_rest);
 
  private:
   static constexpr TimeNs kMoving = -1;
@@ -27,7 +46,7 @@ class StandstillDetector {
   void renew_reference(const FeatureFrame& frame);
   void sort_reference();
   [[nodiscard]] const FeatureObservation* find_in_reference(std::uint64_t id) const;
-  [[nodiscard]] double common_flow_px(const FeatureFrame& frame);
+  [[nodiscard]] std::optional<double> common_flow_px(const FeatureFrame& frame);
 
   StandstillConfig config_;
   double focal_px_;

@@ -27,7 +27,26 @@ Eigen::Matrix<double, 6, 1> local_difference(const Pose& truth, const Pose& esti
   return d;
 }
 
+/// The shortest rotation vector that turns unit vector a into unit vector b.
+Eigen::Vector3d rotation_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  return log_so3(Eigen::Quaterniond::FromTwoVectors(a, b).toRotationMatrix());
+}
+
 }  // namespace
+
+Eigen::Matrix<double, 3, 2> tangent_basis(const Eigen::Vector3d& n) {
+  // The shortest turn from z to n, applied to x and y.
+  const double c = 1.0 / (1.0 + n.z());
+  Eigen::Matrix<double, 3, 2> B;
+  B << 1.0 - c * n.x() * n.x(), -c * n.x() * n.y(), -c * n.x() * n.y(), 1.0 - c * n.y() * n.y(), -n.x(), -n.y();
+  return B;
+}
+
+Eigen::Vector3d tilt_axis(const Eigen::Vector3d& d, const Eigen::Vector3d& up) {
+  const Eigen::Vector3d axis = d.cross(up);
+  if (axis.norm() > 1e-3) return axis.normalized();
+  return d.cross(Eigen::Vector3d::UnitX()).normalized();  // straight down: no tilt changes the range
+}
 
 void boxplus_in_place(State& x, const Eigen::Ref<const Eigen::VectorXd>& d) {
   const Eigen::Matrix3d E = exp_so3(d.segment<3>(err::theta));
@@ -36,6 +55,14 @@ void boxplus_in_place(State& x, const Eigen::Ref<const Eigen::VectorXd>& d) {
   x.imu.p_WB = E * x.imu.p_WB + d.segment<3>(err::rho);
   x.imu.b_g += d.segment<3>(err::b_g);
   x.imu.b_a += d.segment<3>(err::b_a);
+  x.ground.n_W = (E * exp_so3(tangent_basis(x.ground.n_W) * d.segment<2>(err::normal)) * x.ground.n_W).normalized();
+  for (int i = 0; i < kMaxBeams; ++i) {
+    Eigen::Vector3d& d_B = x.odometer.d_B[static_cast<std::size_t>(i)];
+    d_B = exp_so3(tilt_axis(d_B, x.odometer.T_BO.R.col(2)) * d(err::beams + i)) * d_B;
+  }
+  x.odometer.wheel_radius.array() *= 1.0 + d.segment<2>(err::wheel_radius).array();
+  x.odometer.wheel_separation *= 1.0 + d(err::wheel_separation);
+  x.odometer.T_BO.R = renormalized(x.odometer.T_BO.R * exp_so3(d.segment<3>(err::odometer)));
   apply_local(x.camera.T_BC0, d.segment<3>(err::camera), d.segment<3>(err::camera + 3));
   apply_local(x.camera.T_C0C1, d.segment<3>(err::stereo), d.segment<3>(err::stereo + 3));
   x.camera.time_offset += d(err::time_offset);
@@ -59,6 +86,18 @@ Eigen::VectorXd boxminus(const State& truth, const State& estimate) {
   d.segment<3>(err::rho) = truth.imu.p_WB - E * estimate.imu.p_WB;
   d.segment<3>(err::b_g) = truth.imu.b_g - estimate.imu.b_g;
   d.segment<3>(err::b_a) = truth.imu.b_a - estimate.imu.b_a;
+  const Eigen::Vector3d& n = estimate.ground.n_W;
+  d.segment<2>(err::normal) = tangent_basis(n).transpose() * rotation_between(n, E.transpose() * truth.ground.n_W);
+  d.segment<2>(err::wheel_radius) =
+      truth.odometer.wheel_radius.cwiseQuotient(estimate.odometer.wheel_radius).array() - 1.0;
+  d(err::wheel_separation) = truth.odometer.wheel_separation / estimate.odometer.wheel_separation - 1.0;
+  d.segment<3>(err::odometer) = log_so3(estimate.odometer.T_BO.R.transpose() * truth.odometer.T_BO.R);
+  for (int i = 0; i < kMaxBeams; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    const Eigen::Vector3d& beam = estimate.odometer.d_B[k];
+    const Eigen::Vector3d axis = tilt_axis(beam, estimate.odometer.T_BO.R.col(2));
+    d(err::beams + i) = axis.dot(rotation_between(beam, truth.odometer.d_B[k]));
+  }
   d.segment<6>(err::camera) = local_difference(truth.camera.T_BC0, estimate.camera.T_BC0);
   d.segment<6>(err::stereo) = local_difference(truth.camera.T_C0C1, estimate.camera.T_C0C1);
   d(err::time_offset) = truth.camera.time_offset - estimate.camera.time_offset;

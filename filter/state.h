@@ -1,9 +1,11 @@
 // The state, and what an error of it means. Only boxplus and boxminus know the error's definition (docs/filter.md, 1):
-//   R = Exp(theta) R^, v = Exp(theta) v^ + nu, p = Exp(theta) p^ + rho; clones alike; biases and calibration additive,
-//   rotations of the calibration R = Exp(phi) R^.
+//   R = Exp(theta) R^, v = Exp(theta) v^ + nu, p = Exp(theta) p^ + rho; clones alike; n = Exp(theta) Exp(B delta) n^;
+//   biases and calibration additive, wheels relative, rotations of the cameras R = Exp(phi) R^, of the odometer
+//   R = R^ Exp(phi).
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <vector>
 
 #include "ear/types.h"
@@ -13,12 +15,21 @@ namespace ear {
 
 inline const Eigen::Vector3d kGravity_W{0.0, 0.0, -9.81};  ///< [m/s^2]
 
-/// Where each quantity's error stands in the error vector. The camera's part is last, so that its measurements touch
-/// one contiguous range: the calibration of the cameras, then the clones, oldest first.
+/// The most laser beams that a vehicle may have.
+inline constexpr int kMaxBeams = 3;
+
+/// Where each quantity's error stands in the error vector. What wheels and lasers measure lies together, before the
+/// camera's part; that is last, so that its measurements touch one contiguous range too: the calibration of the cameras,
+/// then the clones, oldest first.
 namespace err {
 inline constexpr int theta = 0, nu = 3, rho = 6, b_g = 9, b_a = 12;
 inline constexpr int imu_size = 15;
-inline constexpr int camera = imu_size;         ///< phi, p of camera 0 in the body: 6
+inline constexpr int normal = imu_size;                 ///< delta, tilt of the ground's normal [rad]: 2
+inline constexpr int wheel_radius = normal + 2;         ///< left, right, relative: 2
+inline constexpr int wheel_separation = normal + 4;     ///< relative: 1
+inline constexpr int odometer = normal + 5;             ///< phi, turn of O about its own axes [rad]: 3
+inline constexpr int beams = odometer + 3;              ///< tilt of each laser beam [rad]
+inline constexpr int camera = beams + kMaxBeams;        ///< phi, p of camera 0 in the body: 6
 inline constexpr int stereo = camera + 6;       ///< phi, p of camera 1 in camera 0: 6
 inline constexpr int time_offset = stereo + 6;  ///< [s]
 inline constexpr int calibration_size = 13;
@@ -42,6 +53,21 @@ struct ImuState {
   Eigen::Vector3d b_a = Eigen::Vector3d::Zero();
 };
 
+/// The plane that the wheels stand on.
+struct GroundState {
+  Eigen::Vector3d n_W = Eigen::Vector3d::UnitZ();  ///< its unit normal, upwards
+};
+
+/// Wheels and lasers as the filter knows them.
+struct OdometerState {
+  Eigen::Vector2d wheel_radius = Eigen::Vector2d::Ones();  ///< left, right [m]
+  double wheel_separation = 1.0;                           ///< [m]
+  Pose T_BO;                                               ///< middle of the axle to body
+  std::array<Eigen::Vector3d, kMaxBeams> d_B;              ///< directions of the laser beams
+
+  OdometerState() { d_B.fill(-Eigen::Vector3d::UnitZ()); }
+};
+
 /// The cameras' geometry as the filter knows it.
 struct CameraState {
   Pose T_BC0;                ///< camera 0 to body
@@ -57,11 +83,20 @@ struct Clone {
 
 struct State {
   ImuState imu;
+  GroundState ground;
+  OdometerState odometer;
   CameraState camera;
   std::vector<Clone> clones;  ///< oldest first
 
   [[nodiscard]] int error_size() const { return err::clone(static_cast<int>(clones.size())); }
 };
+
+/// Two unit vectors, as columns, that span the plane perpendicular to the unit vector n; smooth except at n = -z.
+[[nodiscard]] Eigen::Matrix<double, 3, 2> tangent_basis(const Eigen::Vector3d& n);
+
+/// The unit axis about which an error of a beam's direction d turns it: the one that changes its range on a ground
+/// perpendicular to `up`.
+[[nodiscard]] Eigen::Vector3d tilt_axis(const Eigen::Vector3d& d, const Eigen::Vector3d& up);
 
 /// x with the error d applied; d has x.error_size() entries.
 void boxplus_in_place(State& x, const Eigen::Ref<const Eigen::VectorXd>& d);

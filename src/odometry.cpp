@@ -31,36 +31,35 @@ class Odometry::Impl {
         frontend_(config.frontend, calibration.cameras) {}
 
   void add_imu(const ImuSample& sample) { filter_.add_imu(sample); }
+  void add_encoder(const EncoderSample& sample) { filter_.add_encoder(sample); }
+  void add_laser(const LaserSample& sample) { filter_.add_laser(sample); }
 
   std::optional<Estimate> add_stereo(const StereoFrame& frame) {
     stage_times_ = StageTimes{};
-    if (any_frame_ && frame.t_ns <= last_frame_ns_) {
-      ++frames_rejected_;
-      return std::nullopt;
-    }
-    if (!filter_.covers(frame.t_ns)) {
-      ++frames_without_imu_;
-      return std::nullopt;
-    }
+    if (!accepts(frame.t_ns)) return std::nullopt;
     const FeatureFrame* const features = track(frame);
     if (features == nullptr) {
       ++frames_rejected_;
       return std::nullopt;
     }
-    any_frame_ = true;
-    last_frame_ns_ = frame.t_ns;
+    return update(*features);
+  }
 
-    const auto start = std::chrono::steady_clock::now();
-    std::optional<Estimate> estimate = filter_.process(*features);
-    stage_times_.filter = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    return estimate;
+  std::optional<Estimate> step(TimeNs t_ns) {
+    stage_times_ = StageTimes{};
+    FeatureFrame nothing;
+    nothing.t_ns = filter_.camera_time(t_ns);
+    return accepts(nothing.t_ns) ? update(nothing) : std::nullopt;
   }
 
   [[nodiscard]] const Filter& filter() const { return filter_; }
   [[nodiscard]] const StageTimes& stage_times() const { return stage_times_; }
 
   [[nodiscard]] InputCounts input_counts() const {
-    return {filter_.imu_counts().rejected, filter_.imu_counts().gaps, frames_rejected_, frames_without_imu_};
+    InputCounts counts = filter_.input_counts();
+    counts.frames_rejected = frames_rejected_;
+    counts.frames_without_imu = frames_without_imu_;
+    return counts;
   }
 
   [[nodiscard]] Calibration calibration() const {
@@ -72,15 +71,44 @@ class Odometry::Impl {
       result.translation() = T.p;
       return result;
     };
-    learned.cameras.front().T_BC = isometry(camera.T_BC0);
+    if (!learned.cameras.empty()) learned.cameras.front().T_BC = isometry(camera.T_BC0);
     if (learned.cameras.size() == 2) learned.cameras[1].T_BC = isometry(camera.T_BC0) * isometry(camera.T_C0C1);
     learned.camera_time_offset = camera.time_offset;
+    const OdometerState& odometer = filter_.state().odometer;
+    if (learned.encoder) {
+      learned.encoder->wheel_radius = {odometer.wheel_radius(0), odometer.wheel_radius(1)};
+      learned.encoder->wheel_separation = odometer.wheel_separation;
+      learned.encoder->T_BO = isometry(odometer.T_BO);
+    }
+    if (learned.lasers) {
+      for (std::size_t i = 0; i < learned.lasers->beams.size(); ++i) learned.lasers->beams[i].d_B = odometer.d_B[i];
+    }
     return learned;
   }
 
   [[nodiscard]] Impl fresh() const { return Impl(config_, calibration_); }
 
  private:
+  /// Is a frame with this stamp later than the one before, and are its inertial samples there? Counts those that are not.
+  bool accepts(TimeNs t_ns) {
+    if (!filter_.is_next(t_ns)) {
+      ++frames_rejected_;
+      return false;
+    }
+    if (!filter_.covers(t_ns)) {
+      ++frames_without_imu_;
+      return false;
+    }
+    return true;
+  }
+
+  std::optional<Estimate> update(const FeatureFrame& features) {
+    const auto start = std::chrono::steady_clock::now();
+    std::optional<Estimate> estimate = filter_.process(features);
+    stage_times_.filter = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    return estimate;
+  }
+
   /// The frame's features; nothing if its images do not fit the calibration.
   const FeatureFrame* track(const StereoFrame& frame) {
     const MotionPrediction prediction = to_prediction(filter_.motion_to(frame.t_ns));
@@ -103,8 +131,6 @@ class Odometry::Impl {
   Filter filter_;
   Frontend frontend_;
   StageTimes stage_times_;
-  bool any_frame_ = false;
-  TimeNs last_frame_ns_ = 0;
   std::uint64_t frames_rejected_ = 0;
   std::uint64_t frames_without_imu_ = 0;
 };
@@ -116,6 +142,9 @@ Odometry::Odometry(Odometry&&) noexcept = default;
 Odometry& Odometry::operator=(Odometry&&) noexcept = default;
 
 void Odometry::add_imu(const ImuSample& sample) { impl_->add_imu(sample); }
+void Odometry::add_encoder(const EncoderSample& sample) { impl_->add_encoder(sample); }
+void Odometry::add_laser(const LaserSample& sample) { impl_->add_laser(sample); }
+std::optional<Estimate> Odometry::step(TimeNs t_ns) { return impl_->step(t_ns); }
 std::optional<Estimate> Odometry::add_stereo(const StereoFrame& frame) { return impl_->add_stereo(frame); }
 std::optional<NavState> Odometry::predict(TimeNs t_ns) const { return impl_->filter().predict(t_ns); }
 Status Odometry::status() const { return impl_->filter().status(); }

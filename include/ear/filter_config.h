@@ -1,6 +1,8 @@
 // Settings of the filter. One default set serves all recordings; docs/filter.md gives the reasons and the measurements.
 #pragma once
 
+#include <cstdint>
+
 namespace ear {
 
 /// How the filter recognises that the vehicle stands, and how firmly it then holds the pose.
@@ -26,12 +28,42 @@ struct PriorConfig {
   double stereo_rotation = 2e-4;  ///< [rad] camera 1 in camera 0
   double stereo_position = 1e-4;  ///< [m]
   double time_offset = 1e-3;      ///< [s] camera against IMU
+  double wheel_radius = 5e-3;      ///< of each wheel, relative
+  double wheel_separation = 5e-3;  ///< relative
+  double odometer_rotation = 5e-3; ///< [rad] odometer in the body
+  double beam_tilt = 5e-3;         ///< [rad] each laser beam
 };
 
 /// What is calibrated while running. A frozen quantity keeps its value, and its uncertainty is not accounted for.
 struct OnlineCalibrationConfig {
   bool camera_extrinsics = true;  ///< pose of camera 0 in the body, and of camera 1 in camera 0
   bool time_offset = true;        ///< camera against IMU
+  bool wheels = true;             ///< wheel radii, and their separation where the yaw rate is used
+  bool odometer_rotation = true;  ///< the odometer's mounting in the body
+  bool beam_tilt = false;         ///< the directions of the laser beams
+};
+
+/// What is made of the wheels; the paper's Table II compares them.
+enum class OdometerModel : std::uint8_t {
+  none,          ///< stereo and inertial only
+  differential,  ///< speed and yaw rate from the wheels, along the body
+  gyro,          ///< speed from the wheels, along the body; rotation from the gyroscope
+  terrain        ///< the paper's: pitch rate taken into account, direction along the ground that the lasers see
+};
+
+/// Wheels and lasers. What slips or bumps grows with the square root of the distance: [m] per sqrt(m).
+struct OdometerConfig {
+  OdometerModel model = OdometerModel::terrain;
+  bool yaw_rate = false;        ///< use the difference of the wheels with OdometerModel::terrain too
+  double slip = 1e-3;           ///< along the track [m/sqrt(m)]
+  double side_slip = 2e-3;      ///< across it [m/sqrt(m)]
+  double side_slip_turn = 5e-3; ///< across it, while turning [m/s per rad/s]
+  double roughness = 2e-3;      ///< through the ground [m/sqrt(m)]
+  double speed_sigma = 1e-3;    ///< [m/s] every row, also of standing wheels
+  double yaw_rate_sigma = 0.02; ///< [rad/s]
+  double normal_walk = 0.1;     ///< how the ground's normal turns [rad/sqrt(m)]
+  double normal_prior = 0.3;    ///< [rad] before the lasers saw it
+  double unevenness = 0.004;    ///< [m] of the ground under a beam against the plane through the wheels
 };
 
 struct FilterConfig {
@@ -45,6 +77,7 @@ struct FilterConfig {
   PriorConfig prior;
   StandstillConfig standstill;
   OnlineCalibrationConfig online_calibration;
+  OdometerConfig odometer;
 };
 
 }  // namespace ear

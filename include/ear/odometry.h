@@ -1,7 +1,7 @@
 // What an embedding program includes: samples in, estimates out.
 //
 //   ear::Odometry odometry(ear::Config{}, calibration);
-//   odometry.add_imu(sample);                              // as they arrive, in time order
+//   odometry.add_imu(sample);                              // as they arrive; so for encoders and lasers
 //   if (const auto estimate = odometry.add_stereo(frame))  // once per frame
 //     use(estimate->p_WB, estimate->covariance);
 //
@@ -50,12 +50,27 @@ struct FrameStatistics {
   int features_used = 0;      ///< tracks that updated the filter
   int features_rejected = 0;  ///< tracks that failed triangulation or the gate
   int clones = 0;             ///< clones in the window
+  int wheel_rows_used = 0;      ///< rows of the odometer that updated the filter since the frame before
+  int wheel_rows_rejected = 0;  ///< rows of the odometer that failed the gate
+  int beams_used = 0;           ///< laser ranges that updated the filter since the frame before
+  int beams_rejected = 0;       ///< laser ranges that failed the gate
   bool standing = false;      ///< the vehicle was held by a standstill update
+  bool on_ground = false;     ///< the wheels carry the vehicle
+};
+
+/// The ground under the vehicle, on a vehicle with wheels and lasers.
+struct TerrainEstimate {
+  bool known = false;          ///< false in the air, without lasers, and before they saw it
+  double slope_along = 0.0;    ///< in driving direction, uphill positive [rad]
+  double slope_across = 0.0;   ///< to its left, uphill positive [rad]
+  double sigma_along = 0.0;    ///< standard deviation [rad]
+  double sigma_across = 0.0;   ///< [rad]
 };
 
 struct Estimate {
   NavState state;
   Eigen::Matrix<double, estimate_error::size, estimate_error::size> covariance;  ///< see estimate_error
+  TerrainEstimate terrain;
   FrameStatistics frame;
 };
 
@@ -65,6 +80,8 @@ struct InputCounts {
   std::uint64_t imu_gaps = 0;            ///< holes longer than FilterConfig::max_imu_gap
   std::uint64_t frames_rejected = 0;     ///< not later than the frame before, or images that do not fit the calibration
   std::uint64_t frames_without_imu = 0;  ///< no inertial samples reach the frame's time
+  std::uint64_t encoder_rejected = 0;    ///< not later than the sample before, or too late to be used
+  std::uint64_t laser_rejected = 0;      ///< the same, or a number of ranges other than that of the beams
 };
 
 /// Time spent in the last add_stereo [s].
@@ -80,11 +97,18 @@ class Odometry {
   Odometry(Odometry&&) noexcept;
   Odometry& operator=(Odometry&&) noexcept;
 
+  /// Samples of each sensor come in time order, and should be there before the first frame that is later.
   void add_imu(const ImuSample& sample);
+  void add_encoder(const EncoderSample& sample);
+  void add_laser(const LaserSample& sample);
 
   /// The estimate at the frame's time, or nothing while the estimator cannot start (see status()). Inertial samples up
   /// to the frame's time should be there; where the last ones are missing, the newest one is held.
   std::optional<Estimate> add_stereo(const StereoFrame& frame);
+
+  /// The estimate at a time without an image (IMU time), from all other sensors: for vehicles without a camera, and while
+  /// its images do not come.
+  std::optional<Estimate> step(TimeNs t_ns);
 
   /// The newest state, carried on by the inertial samples that came since. Nothing before the start.
   [[nodiscard]] std::optional<NavState> predict(TimeNs t_ns) const;

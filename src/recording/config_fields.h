@@ -4,11 +4,21 @@
 // visit(config, f) calls f(key, field) for every field; a field that is itself a struct of settings becomes a map.
 #pragma once
 
+#include <array>
 #include <type_traits>
+#include <utility>
 
 #include "ear/config.h"
 
 namespace ear {
+
+/// What a choice is called in a file and on the command line: names_of(E{}) lists all values of the enumeration E.
+constexpr auto names_of(OdometerModel) {
+  return std::array<std::pair<const char*, OdometerModel>, 4>{{{"none", OdometerModel::none},
+                                                               {"differential", OdometerModel::differential},
+                                                               {"gyro", OdometerModel::gyro},
+                                                               {"terrain", OdometerModel::terrain}}};
+}
 
 /// C is T, or T and const.
 template <typename C, typename T>
@@ -29,6 +39,10 @@ EnableFor<C, PriorConfig> visit(C& c, F&& f) {
   f("stereo_rotation", c.stereo_rotation);
   f("stereo_position", c.stereo_position);
   f("time_offset", c.time_offset);
+  f("wheel_radius", c.wheel_radius);
+  f("wheel_separation", c.wheel_separation);
+  f("odometer_rotation", c.odometer_rotation);
+  f("beam_tilt", c.beam_tilt);
 }
 
 template <typename C, typename F>
@@ -49,6 +63,24 @@ template <typename C, typename F>
 EnableFor<C, OnlineCalibrationConfig> visit(C& c, F&& f) {
   f("camera_extrinsics", c.camera_extrinsics);
   f("time_offset", c.time_offset);
+  f("wheels", c.wheels);
+  f("odometer_rotation", c.odometer_rotation);
+  f("beam_tilt", c.beam_tilt);
+}
+
+template <typename C, typename F>
+EnableFor<C, OdometerConfig> visit(C& c, F&& f) {
+  f("model", c.model);
+  f("yaw_rate", c.yaw_rate);
+  f("slip", c.slip);
+  f("side_slip", c.side_slip);
+  f("side_slip_turn", c.side_slip_turn);
+  f("roughness", c.roughness);
+  f("speed_sigma", c.speed_sigma);
+  f("yaw_rate_sigma", c.yaw_rate_sigma);
+  f("normal_walk", c.normal_walk);
+  f("normal_prior", c.normal_prior);
+  f("unevenness", c.unevenness);
 }
 
 template <typename C, typename F>
@@ -63,6 +95,7 @@ EnableFor<C, FilterConfig> visit(C& c, F&& f) {
   f("prior", c.prior);
   f("standstill", c.standstill);
   f("online_calibration", c.online_calibration);
+  f("odometer", c.odometer);
 }
 
 template <typename C, typename F>

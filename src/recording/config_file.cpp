@@ -4,6 +4,7 @@
 
 #include <fstream>
 #include <limits>
+#include <stdexcept>
 #include <string>
 #include <type_traits>
 #include <vector>
@@ -15,6 +16,25 @@
 namespace ear {
 namespace {
 
+template <typename E>
+E load_choice(const YamlMap& map, const char* key) {
+  const auto given = map.get<std::string>(key);
+  std::string known;
+  for (const auto& [name, value] : names_of(E{})) {
+    if (given == name) return value;
+    known += (known.empty() ? "" : ", ") + std::string(name);
+  }
+  throw map.error(key, "'" + given + "' is none of " + known);
+}
+
+template <typename E>
+const char* name_of(E choice) {
+  for (const auto& [name, value] : names_of(E{})) {
+    if (value == choice) return name;
+  }
+  throw std::logic_error("a choice without a name in config_fields.h");
+}
+
 template <typename T>
 void load(const YamlMap& map, T& settings) {
   std::vector<std::string> known;
@@ -24,6 +44,8 @@ void load(const YamlMap& map, T& settings) {
     using Field = std::decay_t<decltype(field)>;
     if constexpr (std::is_arithmetic_v<Field>) {
       field = map.get<Field>(key);
+    } else if constexpr (std::is_enum_v<Field>) {
+      field = load_choice<Field>(map, key);
     } else {
       load(map.child(key), field);
     }
@@ -36,8 +58,11 @@ void save(const T& settings, YAML::Emitter& out) {
   out << YAML::BeginMap;
   visit(settings, [&](const char* key, const auto& field) {
     out << YAML::Key << key << YAML::Value;
-    if constexpr (std::is_arithmetic_v<std::decay_t<decltype(field)>>) {
+    using Field = std::decay_t<decltype(field)>;
+    if constexpr (std::is_arithmetic_v<Field>) {
       out << field;
+    } else if constexpr (std::is_enum_v<Field>) {
+      out << name_of(field);
     } else {
       save(field, out);
     }

@@ -39,7 +39,7 @@ TEST_CASE("standstill: believed after its duration, not before") {
   StandstillDetector detector(StandstillConfig{}, kFocal);
   for (int i = 0; i < 30; ++i) {
     CAPTURE(i);
-    const bool still = detector.update(frame_at(i * kFrame, 0.0), quiet(), Eigen::Vector3d::Zero(), 0.02);
+    const bool still = detector.update(frame_at(i * kFrame, 0.0), quiet(), Eigen::Vector3d::Zero(), 0.02, std::nullopt);
     CHECK(still == (i >= 16));  // 15 periods of 33333333 ns are just short of 0.5 s
   }
 }
@@ -47,20 +47,20 @@ TEST_CASE("standstill: believed after its duration, not before") {
 TEST_CASE("standstill: gliding with a quiet IMU is no standing, however slow") {
   StandstillDetector detector(StandstillConfig{}, kFocal);
   for (int i = 0; i < 90; ++i) {
-    CHECK_FALSE(detector.update(frame_at(i * kFrame, 0.05 * i), quiet(), Eigen::Vector3d::Zero(), 0.02));
+    CHECK_FALSE(detector.update(frame_at(i * kFrame, 0.05 * i), quiet(), Eigen::Vector3d::Zero(), 0.02, std::nullopt));
   }
 }
 
 TEST_CASE("standstill: a shaken or turning IMU ends it at once") {
   StandstillDetector detector(StandstillConfig{}, kFocal);
   int i = 0;
-  for (; i < 30; ++i) detector.update(frame_at(i * kFrame, 0.0), quiet(), Eigen::Vector3d::Zero(), 0.02);
+  for (; i < 30; ++i) detector.update(frame_at(i * kFrame, 0.0), quiet(), Eigen::Vector3d::Zero(), 0.02, std::nullopt);
   ImuStatistics shaken = quiet();
   shaken.accel_spread = 4.0;
-  CHECK_FALSE(detector.update(frame_at(i * kFrame, 0.0), shaken, Eigen::Vector3d::Zero(), 0.02));
+  CHECK_FALSE(detector.update(frame_at(i * kFrame, 0.0), shaken, Eigen::Vector3d::Zero(), 0.02, std::nullopt));
   ImuStatistics turning = quiet();
   turning.gyro_mean = {0.0, 0.0, 0.1};
-  CHECK_FALSE(detector.update(frame_at((i + 20) * kFrame, 0.0), turning, Eigen::Vector3d::Zero(), 0.02));
+  CHECK_FALSE(detector.update(frame_at((i + 20) * kFrame, 0.0), turning, Eigen::Vector3d::Zero(), 0.02, std::nullopt));
 }
 
 TEST_CASE("standstill: without features it is not known") {
@@ -68,6 +68,6 @@ TEST_CASE("standstill: without features it is not known") {
   for (int i = 0; i < 60; ++i) {
     FeatureFrame empty;
     empty.t_ns = i * kFrame;
-    CHECK_FALSE(detector.update(empty, quiet(), Eigen::Vector3d::Zero(), 0.02));
+    CHECK_FALSE(detector.update(empty, quiet(), Eigen::Vector3d::Zero(), 0.02, std::nullopt));
   }
 }

@@ -1,0 +1,97 @@
+#include "filter/wheels.h"
+
+#include <cmath>
+
+namespace ear {
+
+std::optional<WheelTurn> EncoderReader::add(const EncoderSample& sample) {
+  const EncoderSample before = last_;
+  const bool first = !any_;
+  last_ = sample;
+  any_ = true;
+  if (first) return std::nullopt;
+  const auto difference = [&](std::int64_t from, std::int64_t to) {
+    std::int64_t d = to - from;
+    if (calibration_.wraps) {
+      const std::int64_t n = calibration_.resolution;
+      d %= n;
+      if (2 * d >= n) d -= n;
+      if (2 * d < -n) d += n;
+    }
+    return 2.0 * M_PI * static_cast<double>(d) / static_cast<double>(calibration_.resolution);
+  };
+  WheelTurn turn;
+  turn.from_ns = before.t_ns;
+  turn.to_ns = sample.t_ns;
+  turn.angle = {difference(before.left_count, sample.left_count), difference(before.right_count, sample.right_count)};
+  return turn;
+}
+
+WheelRows linearize_wheels(const State& x, const Eigen::Matrix3d& R_WB, const Eigen::Vector3d& v_W,
+                           const WheelTurn& turn, const Eigen::Vector3d& gyro_B, OdometerModel model,
+                           bool normal_known) {
+  using Eigen::Vector3d;
+  const OdometerState& odometer = x.odometer;
+  const bool terrain = model == OdometerModel::terrain;
+  const bool on_plane = terrain && normal_known;
+  const Eigen::Matrix3d& R_BO = odometer.T_BO.R;
+  const Vector3d rate = gyro_B - x.imu.b_g;
+  const Vector3d v_O = R_WB.transpose() * v_W + rate.cross(odometer.T_BO.p);
+  const Vector3d y = R_BO.col(1);
+  const Vector3d n = on_plane ? Vector3d(R_WB.transpose() * x.ground.n_W) : Vector3d(R_BO.col(2));
+  const Vector3d along = y.cross(n);
+  const Vector3d f = along.normalized();
+  const Eigen::Vector2d wheel = odometer.wheel_radius.cwiseProduct(turn.angle) / turn.duration();  // rim speeds
+  const double r = odometer.wheel_radius.mean();
+
+  WheelRows rows;
+  rows.wheel_speed = wheel.mean() + (terrain ? r * y.dot(rate) : 0.0);
+  const double turning = (wheel(1) - wheel(0)) / odometer.wheel_separation;
+  rows.residual << rows.wheel_speed - f.dot(v_O), -y.dot(v_O), -n.dot(v_O), turning - n.dot(rate);
+
+  // Derivatives of y, n, f by the state's errors.
+  constexpr int nu = ground_column(err::nu), b_g = ground_column(err::b_g), normal = ground_column(err::normal);
+  constexpr int radius = ground_column(err::wheel_radius), separation = ground_column(err::wheel_separation);
+  constexpr int phi = ground_column(err::odometer);
+  const Eigen::Matrix3d y_phi = -R_BO * skew(Vector3d::UnitY());
+  Eigen::Matrix3d n_phi = Eigen::Matrix3d::Zero();
+  Eigen::Matrix<double, 3, 2> n_delta = Eigen::Matrix<double, 3, 2>::Zero();
+  if (on_plane) {
+    n_delta = -skew(n) * R_WB.transpose() * tangent_basis(x.ground.n_W);
+  } else {
+    n_phi = -R_BO * skew(Vector3d::UnitZ());
+  }
+  const Eigen::Matrix3d unit = (Eigen::Matrix3d::Identity() - f * f.transpose()) / along.norm();
+  const Eigen::Matrix3d f_phi = unit * (skew(y) * n_phi - skew(n) * y_phi);
+  const Eigen::Matrix<double, 3, 2> f_delta = unit * skew(y) * n_delta;
+
+  // How the predictions move with v_O (by nu and by the rate), then with the directions, then with the wheels.
+  Eigen::Matrix<double, 3, 3> direction;
+  direction << f.transpose(), y.transpose(), n.transpose();
+  const Eigen::Matrix3d v_rate = -skew(odometer.T_BO.p);
+  rows.J_gyro.topRows<3>() = direction * v_rate;
+  rows.J_gyro.row(WheelRows::yaw_rate) = n.transpose();
+  if (terrain) rows.J_gyro.row(WheelRows::speed) -= r * y.transpose();
+
+  auto& H = rows.H;
+  H.middleCols<3>(nu).topRows<3>() = direction * R_WB.transpose();
+  H.middleCols<3>(b_g) = -rows.J_gyro;
+  H.block<1, 3>(WheelRows::speed, phi) = v_O.transpose() * f_phi;
+  H.block<1, 3>(WheelRows::side, phi) = v_O.transpose() * y_phi;
+  H.block<1, 3>(WheelRows::slope, phi) = v_O.transpose() * n_phi;
+  H.block<1, 3>(WheelRows::yaw_rate, phi) = rate.transpose() * n_phi;
+  H.block<1, 2>(WheelRows::speed, normal) = v_O.transpose() * f_delta;
+  H.block<1, 2>(WheelRows::slope, normal) = v_O.transpose() * n_delta;
+  H.block<1, 2>(WheelRows::yaw_rate, normal) = rate.transpose() * n_delta;
+  H.block<1, 2>(WheelRows::speed, radius) = -0.5 * wheel.transpose();
+  if (terrain) {
+    H.block<1, 2>(WheelRows::speed, radius) -= 0.5 * y.dot(rate) * odometer.wheel_radius.transpose();
+    H.block<1, 3>(WheelRows::speed, phi) -= r * rate.transpose() * y_phi;
+  }
+  H.block<1, 2>(WheelRows::yaw_rate, radius) << wheel(0) / odometer.wheel_separation,
+      -wheel(1) / odometer.wheel_separation;
+  H(WheelRows::yaw_rate, separation) = turning;
+  return rows;
+}
+
+}  // namespace ear
