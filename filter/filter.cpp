@@ -342,8 +342,7 @@ void Filter::advance(TimeNs t_ns) {
 void Filter::advance_measuring(TimeNs t_ns) {
   while (!turns_.empty() || !ranges_.empty()) {
     const auto middle = [](const WheelTurn& turn) { return turn.from_ns + (turn.to_ns - turn.from_ns) / 2; };
-    const bool wheels_next =
-        !turns_.empty() && (ranges_.empty() || middle(turns_.front()) < ranges_.front().t_ns);
+    const bool wheels_next = !turns_.empty() && (ranges_.empty() || middle(turns_.front()) < ranges_.front().t_ns);
     const TimeNs next_ns = wheels_next ? middle(turns_.front()) : ranges_.front().t_ns;
     if (next_ns > t_ns) break;
     advance(next_ns);

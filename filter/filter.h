@@ -114,10 +114,10 @@ class Filter {
   InputCounts counts_;
   Eigen::Vector3d rate_B_ = Eigen::Vector3d::Zero();  ///< mean rate of the last piece integrated, bias removed [rad/s]
   std::optional<EncoderReader> encoder_;
-  Ring<WheelTurn> turns_;        ///< not yet passed by the state
-  Ring<BeamRanges> ranges_;      ///< the same
+  Ring<WheelTurn> turns_;    ///< not yet passed by the state
+  Ring<BeamRanges> ranges_;  ///< the same
   TimeNs last_range_ns_ = 0;
-  bool ground_known_ = false;    ///< the lasers saw the ground since it was last touched
+  bool ground_known_ = false;  ///< the lasers saw the ground since it was last touched
   WheelRest wheel_rest_;
   StandstillDetector standstill_;
   TrackTable tracks_;
@@ -127,7 +127,7 @@ class Filter {
   Pose image_T_WB_;           ///< body at the last image
   TimeNs last_image_ns_ = 0;  ///< its camera stamp
   bool any_image_ = false;
-  bool clone_is_here_ = false;  ///< the newest clone was made where the vehicle is, if it stands
+  bool clone_is_here_ = false;      ///< the newest clone was made where the vehicle is, if it stands
   bool learn_calibration_ = false;  ///< standing tells nothing about it
   FrameStatistics statistics_;
 

@@ -1,4 +1,5 @@
-// The ground under the vehicle as a plane, and the laser beams that see it. The paper's III-B; docs/filter.md, section 7.
+// The ground under the vehicle as a plane, and the laser beams that see it. The paper's III-B; docs/filter.md,
+// section 7.
 #pragma once
 
 #include <Eigen/Core>
@@ -19,8 +20,7 @@ struct GroundPlane {
 /// The plane through the hits of the first three beams; `p_BO` is the middle of the axle. Nothing if a range is not
 /// finite, or the hits lie so close to one line that 4 mm of noise would turn the plane by more than 10 degrees.
 [[nodiscard]] std::optional<GroundPlane> plane_through_hits(const std::vector<LaserBeam>& beams,
-                                                            const Eigen::Vector3d& range,
-                                                            const Eigen::Vector3d& p_BO);
+                                                            const Eigen::Vector3d& range, const Eigen::Vector3d& p_BO);
 
 /// Slope of the ground as the vehicle stands on it.
 struct Slope {
@@ -33,8 +33,8 @@ struct Slope {
 [[nodiscard]] Slope slope(const Eigen::Vector3d& y_W, const Eigen::Vector3d& n_W);
 
 /// A beam's range on the ground at contact, linearized: range = predicted + H_normal delta + H_tilt tilt. The body's
-/// attitude does not appear: the normal's error is counted from it. Nor does the wheels' radius: the ground's unevenness
-/// at the beams is not white, and must not be taken for an error of the radius.
+/// attitude does not appear: the normal's error is counted from it. Nor does the wheels' radius: the ground's
+/// unevenness at the beams is not white, and must not be taken for an error of the radius.
 struct BeamPrediction {
   double range = 0.0;  ///< [m]; not positive, or not finite, if the beam does not meet the ground
   Eigen::RowVector2d H_normal = Eigen::RowVector2d::Zero();

@@ -19,19 +19,19 @@ inline const Eigen::Vector3d kGravity_W{0.0, 0.0, -9.81};  ///< [m/s^2]
 inline constexpr int kMaxBeams = 3;
 
 /// Where each quantity's error stands in the error vector. What wheels and lasers measure lies together, before the
-/// camera's part; that is last, so that its measurements touch one contiguous range too: the calibration of the cameras,
-/// then the clones, oldest first.
+/// camera's part; that is last, so that its measurements touch one contiguous range too: the calibration of the
+/// cameras, then the clones, oldest first.
 namespace err {
 inline constexpr int theta = 0, nu = 3, rho = 6, b_g = 9, b_a = 12;
 inline constexpr int imu_size = 15;
-inline constexpr int normal = imu_size;                 ///< delta, tilt of the ground's normal [rad]: 2
-inline constexpr int wheel_radius = normal + 2;         ///< left, right, relative: 2
-inline constexpr int wheel_separation = normal + 4;     ///< relative: 1
-inline constexpr int odometer = normal + 5;             ///< phi, turn of O about its own axes [rad]: 3
-inline constexpr int beams = odometer + 3;              ///< tilt of each laser beam [rad]
-inline constexpr int camera = beams + kMaxBeams;        ///< phi, p of camera 0 in the body: 6
-inline constexpr int stereo = camera + 6;       ///< phi, p of camera 1 in camera 0: 6
-inline constexpr int time_offset = stereo + 6;  ///< [s]
+inline constexpr int normal = imu_size;              ///< delta, tilt of the ground's normal [rad]: 2
+inline constexpr int wheel_radius = normal + 2;      ///< left, right, relative: 2
+inline constexpr int wheel_separation = normal + 4;  ///< relative: 1
+inline constexpr int odometer = normal + 5;          ///< phi, turn of O about its own axes [rad]: 3
+inline constexpr int beams = odometer + 3;           ///< tilt of each laser beam [rad]
+inline constexpr int camera = beams + kMaxBeams;     ///< phi, p of camera 0 in the body: 6
+inline constexpr int stereo = camera + 6;            ///< phi, p of camera 1 in camera 0: 6
+inline constexpr int time_offset = stereo + 6;       ///< [s]
 inline constexpr int calibration_size = 13;
 inline constexpr int clones = camera + calibration_size;
 inline constexpr int clone_size = 6;  ///< theta, rho

@@ -26,8 +26,8 @@ class EncoderReader {
  public:
   explicit EncoderReader(const EncoderCalibration& calibration) : calibration_(calibration) {}
 
-  /// The turn since the reading before; nothing for the first. A difference is taken the short way round: wheels must not
-  /// turn by more than half a revolution between readings.
+  /// The turn since the reading before; nothing for the first. A difference is taken the short way round: wheels must
+  /// not turn by more than half a revolution between readings.
   [[nodiscard]] std::optional<WheelTurn> add(const EncoderSample& sample);
 
   [[nodiscard]] bool any() const { return any_; }

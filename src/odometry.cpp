@@ -25,10 +25,9 @@ MotionPrediction to_prediction(const std::optional<RelativeMotion>& motion) {
 class Odometry::Impl {
  public:
   Impl(const Config& config, const Calibration& calibration)
-      : config_(config),
-        calibration_(calibration),
-        filter_(config.filter, calibration),
-        frontend_(config.frontend, calibration.cameras) {}
+      : config_(config), calibration_(calibration), filter_(config.filter, calibration) {
+    if (!calibration.cameras.empty()) frontend_.emplace(config.frontend, calibration.cameras);
+  }
 
   void add_imu(const ImuSample& sample) { filter_.add_imu(sample); }
   void add_encoder(const EncoderSample& sample) { filter_.add_encoder(sample); }
@@ -89,7 +88,8 @@ class Odometry::Impl {
   [[nodiscard]] Impl fresh() const { return Impl(config_, calibration_); }
 
  private:
-  /// Is a frame with this stamp later than the one before, and are its inertial samples there? Counts those that are not.
+  /// Is a frame with this stamp later than the one before, and are its inertial samples there? Counts those that are
+  /// not.
   bool accepts(TimeNs t_ns) {
     if (!filter_.is_next(t_ns)) {
       ++frames_rejected_;
@@ -111,10 +111,11 @@ class Odometry::Impl {
 
   /// The frame's features; nothing if its images do not fit the calibration.
   const FeatureFrame* track(const StereoFrame& frame) {
+    if (!frontend_) return nullptr;
     const MotionPrediction prediction = to_prediction(filter_.motion_to(frame.t_ns));
     try {
-      const FeatureFrame& features = frontend_.process(frame, prediction);
-      const FrontendTiming& timing = frontend_.timing();
+      const FeatureFrame& features = frontend_->process(frame, prediction);
+      const FrontendTiming& timing = frontend_->timing();
       stage_times_.pyramid = timing.pyramid;
       stage_times_.track = timing.track;
       stage_times_.detect = timing.detect;
@@ -129,7 +130,7 @@ class Odometry::Impl {
   Config config_;
   Calibration calibration_;
   Filter filter_;
-  Frontend frontend_;
+  std::optional<Frontend> frontend_;  ///< with a camera
   StageTimes stage_times_;
   std::uint64_t frames_rejected_ = 0;
   std::uint64_t frames_without_imu_ = 0;

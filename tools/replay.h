@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 #include <optional>
 
 #include "ear/odometry.h"
@@ -9,14 +10,15 @@
 
 namespace ear::tools {
 
-/// What became of one stereo frame. `estimate` is empty while the estimator has not started.
+/// What became of one stereo frame, or of a step without one. `estimate` is empty while the estimator has not started.
 struct ReplayedFrame {
   TimeNs t_ns = 0;
   std::optional<Estimate> estimate;
 };
 
 /// Feeds every sample of the recording to `odometry`. A frame is handed over when the first inertial sample after it is
-/// in: images take longer to arrive than inertial samples. Calls `on_frame` after each.
+/// in: images take longer to arrive than inertial samples. While no images come, the estimator is stepped at 20 Hz.
+/// Calls `on_frame` after each.
 void replay(Recording& recording, Odometry& odometry, const std::function<void(const ReplayedFrame&)>& on_frame);
 
 }  // namespace ear::tools

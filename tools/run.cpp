@@ -5,9 +5,12 @@
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
+#include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "src/recording/config_fields.h"
 #include "src/recording/config_file.h"
 #include "src/recording/input_error.h"
 #include "src/recording/recording.h"
@@ -26,6 +29,7 @@ struct RunArguments {
   std::vector<std::filesystem::path> calibration;
   double camera_rate_hz = 0.0;
   bool mono = false;
+  std::optional<OdometerModel> odometer;
 };
 
 /// What happened over the whole run.
@@ -35,6 +39,10 @@ struct Totals {
   std::uint64_t standing = 0;
   std::uint64_t features_used = 0;
   std::uint64_t features_rejected = 0;
+  std::uint64_t wheel_rows_used = 0;
+  std::uint64_t wheel_rows_rejected = 0;
+  std::uint64_t beams_used = 0;
+  std::uint64_t beams_rejected = 0;
   StageTimes times;
 
   void add(const ReplayedFrame& frame, const StageTimes& stages) {
@@ -50,6 +58,10 @@ struct Totals {
     standing += frame.estimate->frame.standing ? 1 : 0;
     features_used += static_cast<std::uint64_t>(frame.estimate->frame.features_used);
     features_rejected += static_cast<std::uint64_t>(frame.estimate->frame.features_rejected);
+    wheel_rows_used += static_cast<std::uint64_t>(frame.estimate->frame.wheel_rows_used);
+    wheel_rows_rejected += static_cast<std::uint64_t>(frame.estimate->frame.wheel_rows_rejected);
+    beams_used += static_cast<std::uint64_t>(frame.estimate->frame.beams_used);
+    beams_rejected += static_cast<std::uint64_t>(frame.estimate->frame.beams_rejected);
   }
 };
 
@@ -93,6 +105,12 @@ RunSummary summarize(const RunArguments& args, const Recording& recording, const
                     {"frames_standing", totals.standing},
                     {"features_used", totals.features_used},
                     {"features_rejected", totals.features_rejected},
+                    {"wheel_rows_used", totals.wheel_rows_used},
+                    {"wheel_rows_rejected", totals.wheel_rows_rejected},
+                    {"beams_used", totals.beams_used},
+                    {"beams_rejected", totals.beams_rejected},
+                    {"encoder_rejected", inputs.encoder_rejected},
+                    {"laser_rejected", inputs.laser_rejected},
                     {"imu_rejected", inputs.imu_rejected},
                     {"imu_gaps", inputs.imu_gaps},
                     {"frames_rejected", inputs.frames_rejected},
@@ -108,7 +126,8 @@ RunSummary summarize(const RunArguments& args, const Recording& recording, const
 
 void run(const RunArguments& args) {
   cv::setNumThreads(1);  // the same result whatever the machine
-  const Config config = args.config.empty() ? Config{} : load_config(args.config);
+  Config config = args.config.empty() ? Config{} : load_config(args.config);
+  if (args.odometer) config.filter.odometer.model = *args.odometer;
   RecordingOptions options;
   options.calibration_files = args.calibration;
   options.camera_rate_hz = args.camera_rate_hz;
@@ -167,6 +186,10 @@ void add_run_command(CLI::App& app) {
   command->add_option("--camera-rate", args->camera_rate_hz, "Leave out frames to reach this rate [Hz]")
       ->check(CLI::PositiveNumber);
   command->add_flag("--mono", args->mono, "Ignore the right camera");
+  std::map<std::string, OdometerModel> models;
+  for (const auto& [name, model] : names_of(OdometerModel{})) models.emplace(name, model);
+  command->add_option("--odometer", args->odometer, "What is made of the wheels: none, differential, gyro or terrain")
+      ->transform(CLI::CheckedTransformer(models));
   command->callback([args] { run(*args); });
 }
 

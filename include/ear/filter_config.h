@@ -21,17 +21,17 @@ struct StandstillConfig {
 
 /// Standard deviations at the start, before anything was measured.
 struct PriorConfig {
-  double gyro_bias = 0.1;         ///< [rad/s]
-  double accel_bias = 0.05;       ///< [m/s^2]
-  double camera_rotation = 2e-3;  ///< [rad] camera 0 in the body, where it is estimated
-  double camera_position = 1e-3;  ///< [m]
-  double stereo_rotation = 2e-4;  ///< [rad] camera 1 in camera 0
-  double stereo_position = 1e-4;  ///< [m]
-  double time_offset = 1e-3;      ///< [s] camera against IMU
-  double wheel_radius = 5e-3;      ///< of each wheel, relative
-  double wheel_separation = 5e-3;  ///< relative
-  double odometer_rotation = 5e-3; ///< [rad] odometer in the body
-  double beam_tilt = 5e-3;         ///< [rad] each laser beam
+  double gyro_bias = 0.1;           ///< [rad/s]
+  double accel_bias = 0.05;         ///< [m/s^2]
+  double camera_rotation = 2e-3;    ///< [rad] camera 0 in the body, where it is estimated
+  double camera_position = 1e-3;    ///< [m]
+  double stereo_rotation = 2e-4;    ///< [rad] camera 1 in camera 0
+  double stereo_position = 1e-4;    ///< [m]
+  double time_offset = 1e-3;        ///< [s] camera against IMU
+  double wheel_radius = 5e-3;       ///< of each wheel, relative
+  double wheel_separation = 5e-3;   ///< relative
+  double odometer_rotation = 5e-3;  ///< [rad] odometer in the body
+  double beam_tilt = 5e-3;          ///< [rad] each laser beam
 };
 
 /// What is calibrated while running. A frozen quantity keeps its value, and its uncertainty is not accounted for.
@@ -54,16 +54,16 @@ enum class OdometerModel : std::uint8_t {
 /// Wheels and lasers. What slips or bumps grows with the square root of the distance: [m] per sqrt(m).
 struct OdometerConfig {
   OdometerModel model = OdometerModel::terrain;
-  bool yaw_rate = false;        ///< use the difference of the wheels with OdometerModel::terrain too
-  double slip = 1e-3;           ///< along the track [m/sqrt(m)]
-  double side_slip = 2e-3;      ///< across it [m/sqrt(m)]
-  double side_slip_turn = 5e-3; ///< across it, while turning [m/s per rad/s]
-  double roughness = 2e-3;      ///< through the ground [m/sqrt(m)]
-  double speed_sigma = 1e-3;    ///< [m/s] every row, also of standing wheels
-  double yaw_rate_sigma = 0.02; ///< [rad/s]
-  double normal_walk = 0.1;     ///< how the ground's normal turns [rad/sqrt(m)]
-  double normal_prior = 0.3;    ///< [rad] before the lasers saw it
-  double unevenness = 0.004;    ///< [m] of the ground under a beam against the plane through the wheels
+  bool yaw_rate = false;         ///< use the difference of the wheels with OdometerModel::terrain too
+  double slip = 1e-3;            ///< along the track [m/sqrt(m)]
+  double side_slip = 2e-3;       ///< across it [m/sqrt(m)]
+  double side_slip_turn = 5e-3;  ///< across it, while turning [m/s per rad/s]
+  double roughness = 2e-3;       ///< through the ground [m/sqrt(m)]
+  double speed_sigma = 1e-3;     ///< [m/s] every row, also of standing wheels
+  double yaw_rate_sigma = 0.02;  ///< [rad/s]
+  double normal_walk = 0.1;      ///< how the ground's normal turns [rad/sqrt(m)]
+  double normal_prior = 0.3;     ///< [rad] before the lasers saw it
+  double unevenness = 0.004;     ///< [m] of the ground under a beam against the plane through the wheels
 };
 
 struct FilterConfig {

@@ -45,26 +45,26 @@ struct NavState {
 
 /// How the last frame was used.
 struct FrameStatistics {
-  int tracks = 0;             ///< features seen in this frame
-  int stereo = 0;             ///< of these, seen by both cameras
-  int features_used = 0;      ///< tracks that updated the filter
-  int features_rejected = 0;  ///< tracks that failed triangulation or the gate
-  int clones = 0;             ///< clones in the window
+  int tracks = 0;               ///< features seen in this frame
+  int stereo = 0;               ///< of these, seen by both cameras
+  int features_used = 0;        ///< tracks that updated the filter
+  int features_rejected = 0;    ///< tracks that failed triangulation or the gate
+  int clones = 0;               ///< clones in the window
   int wheel_rows_used = 0;      ///< rows of the odometer that updated the filter since the frame before
   int wheel_rows_rejected = 0;  ///< rows of the odometer that failed the gate
   int beams_used = 0;           ///< laser ranges that updated the filter since the frame before
   int beams_rejected = 0;       ///< laser ranges that failed the gate
-  bool standing = false;      ///< the vehicle was held by a standstill update
-  bool on_ground = false;     ///< the wheels carry the vehicle
+  bool standing = false;        ///< the vehicle was held by a standstill update
+  bool on_ground = false;       ///< the wheels carry the vehicle
 };
 
 /// The ground under the vehicle, on a vehicle with wheels and lasers.
 struct TerrainEstimate {
-  bool known = false;          ///< false in the air, without lasers, and before they saw it
-  double slope_along = 0.0;    ///< in driving direction, uphill positive [rad]
-  double slope_across = 0.0;   ///< to its left, uphill positive [rad]
-  double sigma_along = 0.0;    ///< standard deviation [rad]
-  double sigma_across = 0.0;   ///< [rad]
+  bool known = false;         ///< false in the air, without lasers, and before they saw it
+  double slope_along = 0.0;   ///< in driving direction, uphill positive [rad]
+  double slope_across = 0.0;  ///< to its left, uphill positive [rad]
+  double sigma_along = 0.0;   ///< standard deviation [rad]
+  double sigma_across = 0.0;  ///< [rad]
 };
 
 struct Estimate {
@@ -106,8 +106,8 @@ class Odometry {
   /// to the frame's time should be there; where the last ones are missing, the newest one is held.
   std::optional<Estimate> add_stereo(const StereoFrame& frame);
 
-  /// The estimate at a time without an image (IMU time), from all other sensors: for vehicles without a camera, and while
-  /// its images do not come.
+  /// The estimate at a time without an image (IMU time), from all other sensors: for vehicles without a camera, and
+  /// while its images do not come.
   std::optional<Estimate> step(TimeNs t_ns);
 
   /// The newest state, carried on by the inertial samples that came since. Nothing before the start.

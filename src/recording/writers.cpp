@@ -39,7 +39,9 @@ std::string states_heading() {
   for (const SigmaGroup& group : kSigmas) {
     for (const char* axis : {"_x", "_y", "_z"}) heading += std::string(",sigma_") + group.name + axis;
   }
-  return heading + ",tracks,stereo,features_used,features_rejected,clones,standing\n";
+  return heading +
+         ",tracks,stereo,features_used,features_rejected,clones,wheel_rows_used,wheel_rows_rejected,beams_used,"
+         "beams_rejected,standing,on_ground,slope_along,slope_across,sigma_slope_along,sigma_slope_across\n";
 }
 
 void append(std::string& line, double value) {
@@ -107,10 +109,21 @@ void StatesWriter::write(const Estimate& estimate) {
     append(line, estimate.covariance.diagonal().segment<3>(group.index).cwiseMax(0.0).cwiseSqrt().eval());
   }
   const FrameStatistics& frame = estimate.frame;
-  for (const int count : {frame.tracks, frame.stereo, frame.features_used, frame.features_rejected, frame.clones}) {
+  for (const int count : {frame.tracks, frame.stereo, frame.features_used, frame.features_rejected, frame.clones,
+                          frame.wheel_rows_used, frame.wheel_rows_rejected, frame.beams_used, frame.beams_rejected}) {
     line += "," + std::to_string(count);
   }
-  out_.write(line + (frame.standing ? ",1\n" : ",0\n"));
+  line += frame.standing ? ",1" : ",0";
+  line += frame.on_ground ? ",1" : ",0";
+  const TerrainEstimate& ground = estimate.terrain;
+  for (const double value : {ground.slope_along, ground.slope_across, ground.sigma_along, ground.sigma_across}) {
+    if (ground.known) {
+      append(line, value);
+    } else {
+      line += ",";
+    }
+  }
+  out_.write(line + "\n");
 }
 
 void write_summary(const RunSummary& summary, const std::filesystem::path& file) {

@@ -91,7 +91,7 @@ Covariance some_covariance(std::mt19937_64& rng, const State& x) {
   for (std::size_t i = 0; i < x.clones.size(); ++i) {
     ErrorTransition walk;
     walk.Q.diagonal().setConstant(1e-5);
-    P.propagate(walk);
+    P.propagate(walk, tangent_basis(Eigen::Vector3d::UnitZ()), 1e-5);
     Eigen::Matrix<double, 6, err::imu_size> J = Eigen::Matrix<double, 6, err::imu_size>::Zero();
     J.block<3, 3>(0, err::theta).setIdentity();
     J.block<3, 3>(3, err::rho).setIdentity();

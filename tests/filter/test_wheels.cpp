@@ -58,7 +58,7 @@ TEST_CASE("wheels: a left turn has the right wheel ahead") {
 
 TEST_CASE("wheels: a nose-down swing on standing wheels turns the encoders back, and moves the IMU, not the axle") {
   State x = simple_state();
-  const double rate = 0.7;  // nose-down is positive about y, to the left
+  const double rate = 0.7;              // nose-down is positive about y, to the left
   x.imu.v_W = {rate * 0.05, 0.0, 0.0};  // the IMU is above the axle and goes forward
   const WheelTurn turn = rims(-rate * kRadius, -rate * kRadius);
   const WheelRows terrain = rows_of(x, turn, {0.0, rate, 0.0});

@@ -38,6 +38,8 @@ std::size_t estimates_when_started_at(const simulator::Simulation& simulation, d
     void add_imu(const ImuSample& sample) {
       if (sample.t_ns >= from) filter.add_imu(sample);
     }
+    void add_encoder(const EncoderSample& sample) { filter.add_encoder(sample); }
+    void add_laser(const LaserSample& sample) { filter.add_laser(sample); }
   };
   const TimeNs first = simulation.frame_times().front();
   LateStart receiver{filter, first + static_cast<TimeNs>(1e9 * start)};
@@ -188,8 +190,8 @@ TEST_CASE("filter: samples that are not numbers, late or twice are refused and c
   sample.gyro_B.x() = 0.0;
   sample.accel_B.z() = std::numeric_limits<double>::infinity();
   filter.add_imu(sample);
-  CHECK(filter.imu_counts().rejected == 4);
-  CHECK(filter.imu_counts().gaps == 0);
+  CHECK(filter.input_counts().imu_rejected == 4);
+  CHECK(filter.input_counts().imu_gaps == 0);
 }
 
 TEST_CASE("filter: wild observations do no harm") {
@@ -224,6 +226,8 @@ TEST_CASE("filter: a hole in the inertial data is counted and survived") {
       const double t = seconds_between(start, sample.t_ns);
       if (t < 8.0 || t > 8.2) filter.add_imu(sample);
     }
+    void add_encoder(const EncoderSample& sample) { filter.add_encoder(sample); }
+    void add_laser(const LaserSample& sample) { filter.add_laser(sample); }
   };
   WithHole receiver{filter, simulation.imu().front().t_ns};
   experiments::SampleFeed feed(simulation);
@@ -232,7 +236,7 @@ TEST_CASE("filter: a hole in the inertial data is counted and survived") {
     feed.until_frame(simulation.frame_times()[i], receiver);
     estimate = filter.process(simulation.tracks(i));
   }
-  CHECK(filter.imu_counts().gaps == 1);
+  CHECK(filter.input_counts().imu_gaps == 1);
   REQUIRE(estimate);
   const simulator::Truth truth = simulation.truth(estimate->state.t_ns);
   CHECK((estimate->state.v_W.norm() - truth.v_W.norm()) < 0.1);
@@ -248,5 +252,9 @@ TEST_CASE("filter: settings and calibrations that cannot be are refused by name"
   calibration.cameras[0].T_BC.linear() *= 1.1;
   CHECK_THROWS_AS(Filter(FilterConfig{}, calibration), std::invalid_argument);
   calibration.cameras.clear();
+  CHECK_NOTHROW(Filter(FilterConfig{}, calibration));  // wheels are enough
+  calibration.encoder->wheel_separation = 0.0;
+  CHECK_THROWS_AS(Filter(FilterConfig{}, calibration), std::invalid_argument);
+  calibration.encoder.reset();
   CHECK_THROWS_AS(Filter(FilterConfig{}, calibration), std::invalid_argument);
 }

@@ -12,7 +12,7 @@ namespace {
 const fs::path kShipped = fs::path(EAR_SOURCE_DIR) / "config/default.yaml";
 
 template <typename T>
-constexpr bool kIsSettings = !std::is_arithmetic_v<T>;
+constexpr bool kIsSettings = !std::is_arithmetic_v<T> && !std::is_enum_v<T>;
 
 // Keys and values of all settings: "filter.prior.gyro_bias=0.1".
 template <typename T>
@@ -23,7 +23,12 @@ void list_settings(const T& settings, const std::string& prefix, std::vector<std
     } else {
       std::ostringstream text;
       text.precision(17);
-      text << prefix << key << "=" << field;
+      text << prefix << key << "=";
+      if constexpr (std::is_enum_v<std::decay_t<decltype(field)>>) {
+        text << static_cast<int>(field);
+      } else {
+        text << field;
+      }
       out.push_back(text.str());
     }
   });
@@ -44,6 +49,8 @@ void change_all(T& settings) {
       change_all(field);
     } else if constexpr (std::is_same_v<Field, bool>) {
       field = !field;
+    } else if constexpr (std::is_enum_v<Field>) {
+      field = names_of(Field{}).front().second == field ? names_of(Field{}).back().second : names_of(Field{}).front().second;
     } else {
       field = static_cast<Field>(field * 2 + 1);
     }
