@@ -120,7 +120,7 @@ void StatesWriter::write(const Estimate& estimate) {
     if (ground.known) {
       append(line, value);
     } else {
-      line += ",";
+      line += ",nan";
     }
   }
   out_.write(line + "\n");

@@ -10,7 +10,11 @@ namespace {
 /// Notes what it is given.
 struct Receiver {
   std::vector<TimeNs> stamps;
+  std::size_t encoders = 0;
+  std::size_t lasers = 0;
   void add_imu(const ImuSample& sample) { stamps.push_back(sample.t_ns); }
+  void add_encoder(const EncoderSample&) { ++encoders; }
+  void add_laser(const LaserSample&) { ++lasers; }
 };
 
 TEST_CASE("sample feed: every sample once, in time order, and none that is later than the frame's arrival") {
@@ -28,6 +32,8 @@ TEST_CASE("sample feed: every sample once, in time order, and none that is later
   }
   feed.until(simulation.imu().back().t_ns + 1, receiver);
   REQUIRE(receiver.stamps.size() == simulation.imu().size());
+  CHECK(receiver.encoders >= simulation.encoders().size() - 1);  // the last may be later than the last IMU sample
+  CHECK(receiver.lasers >= simulation.lasers().size() - 1);
   for (std::size_t i = 0; i < receiver.stamps.size(); ++i) CHECK(receiver.stamps[i] == simulation.imu()[i].t_ns);
 }
 

@@ -50,7 +50,8 @@ void change_all(T& settings) {
     } else if constexpr (std::is_same_v<Field, bool>) {
       field = !field;
     } else if constexpr (std::is_enum_v<Field>) {
-      field = names_of(Field{}).front().second == field ? names_of(Field{}).back().second : names_of(Field{}).front().second;
+      field = names_of(Field{}).front().second == field ? names_of(Field{}).back().second
+                                                        : names_of(Field{}).front().second;
     } else {
       field = static_cast<Field>(field * 2 + 1);
     }

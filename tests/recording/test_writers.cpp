@@ -23,7 +23,7 @@ Estimate numbered_estimate() {
   for (int i = 0; i < estimate_error::size; ++i) {
     for (int j = 0; j < estimate_error::size; ++j) e.covariance(i, j) = 100 * std::min(i, j) + std::max(i, j);
   }
-  e.frame = {60, 61, 62, 63, 64, true};
+  e.frame = {60, 61, 62, 63, 64, 65, 66, 67, 68, true, true};
   return e;
 }
 
@@ -68,7 +68,7 @@ TEST_CASE("states: every value stands below its name") {
   }
   CHECK_FALSE(std::getline(fields, field, ','));
 
-  CHECK(row.size() == 1 + 3 + 4 + 9 + 21 + 9 + 6);
+  CHECK(row.size() == 1 + 3 + 4 + 9 + 21 + 9 + 11 + 4);
   CHECK(row["t_ns"] == "1403715273262142976");
   CHECK(row["p_z"] == "3");
   CHECK(row["q_w"] == "0.5");
@@ -86,7 +86,12 @@ TEST_CASE("states: every value stands below its name") {
   CHECK(std::stod(row["sigma_b_a_z"]) == doctest::Approx(std::sqrt(1414.0)));
   CHECK(row["tracks"] == "60");
   CHECK(row["clones"] == "64");
+  CHECK(row["wheel_rows_rejected"] == "66");
+  CHECK(row["beams_used"] == "67");
   CHECK(row["standing"] == "1");
+  CHECK(row["on_ground"] == "1");
+  CHECK(row["slope_across"] == "0.7");
+  CHECK(row["sigma_slope_along"] == "0.8");
 }
 
 TEST_CASE("summary: valid JSON with all that was said") {
