@@ -5,6 +5,7 @@
 #pragma once
 
 #include <array>
+#include <stdexcept>
 #include <type_traits>
 #include <utility>
 
@@ -18,6 +19,15 @@ constexpr auto names_of(OdometerModel) {
                                                                {"differential", OdometerModel::differential},
                                                                {"gyro", OdometerModel::gyro},
                                                                {"terrain", OdometerModel::terrain}}};
+}
+
+/// The name of one of them.
+template <typename E>
+const char* name_of(E choice) {
+  for (const auto& [name, value] : names_of(E{})) {
+    if (value == choice) return name;
+  }
+  throw std::logic_error("a choice without a name in config_fields.h");
 }
 
 /// C is T, or T and const.

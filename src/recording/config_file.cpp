@@ -27,14 +27,6 @@ E load_choice(const YamlMap& map, const char* key) {
   throw map.error(key, "'" + given + "' is none of " + known);
 }
 
-template <typename E>
-const char* name_of(E choice) {
-  for (const auto& [name, value] : names_of(E{})) {
-    if (value == choice) return name;
-  }
-  throw std::logic_error("a choice without a name in config_fields.h");
-}
-
 template <typename T>
 void load(const YamlMap& map, T& settings) {
   std::vector<std::string> known;

@@ -21,22 +21,24 @@ const std::vector<Run> kRuns{run("flat1", 1, 0.01, 90.0), run("fly1", 1, std::nu
 
 TEST_CASE("table: one row per setup; median, worst and mean; columns that nobody has are left out") {
   CHECK(to_markdown(kRuns) ==
-        "| sequence | Hz | calibration | settings | seeds | ATE [m] | worst | coverage [%] |\n"
-        "|---|---|---|---|---|---|---|---|\n"
-        "| flat1 | 30 | true | default | 3 | 0.02 | 0.5 | 95 |\n"
-        "| fly1 | 30 | true | default | 1 of 2 | 1234 | 1234 | 25 |\n");
+        "| sequence | Hz | odometer | calibration | settings | seeds | ATE [m] | worst | coverage [%] |\n"
+        "|---|---|---|---|---|---|---|---|---|\n"
+        "| flat1 | 30 | none | true | default | 3 | 0.02 | 0.5 | 95 |\n"
+        "| fly1 | 30 | none | true | default | 1 of 2 | 1234 | 1234 | 25 |\n");
 }
 
 TEST_CASE("table: setups that differ in one thing are different rows") {
-  std::vector<Run> runs(4, kRuns[0]);
+  std::vector<Run> runs(5, kRuns[0]);
   runs[1].setup.camera_rate_hz = 10.0;
   runs[2].setup.true_calibration = false;
   runs[3].setup.settings = "other";
+  runs[4].setup.odometer = "terrain";
   const std::string text = to_markdown(runs);
-  CHECK(text.find("| flat1 | 30 | true | default | 1 |") != std::string::npos);
-  CHECK(text.find("| flat1 | 10 | true | default | 1 |") != std::string::npos);
-  CHECK(text.find("| flat1 | 30 | true | other | 1 |") != std::string::npos);
-  CHECK(text.find("| flat1 | 30 | wrong | default | 1 |") != std::string::npos);
+  CHECK(text.find("| flat1 | 30 | none | true | default | 1 |") != std::string::npos);
+  CHECK(text.find("| flat1 | 10 | none | true | default | 1 |") != std::string::npos);
+  CHECK(text.find("| flat1 | 30 | terrain | true | default | 1 |") != std::string::npos);
+  CHECK(text.find("| flat1 | 30 | none | true | other | 1 |") != std::string::npos);
+  CHECK(text.find("| flat1 | 30 | none | wrong | default | 1 |") != std::string::npos);
 }
 
 TEST_CASE("table: JSON holds every run; what is missing is null") {

@@ -18,6 +18,7 @@
 #include <thread>
 #include <vector>
 
+#include "src/recording/config_fields.h"
 #include "src/recording/config_file.h"
 #include "tools/evaluation/alignment.h"
 #include "tools/experiments/table.h"
@@ -33,6 +34,8 @@ struct Arguments {
   std::vector<std::string> sequences{"all"};
   std::vector<std::string> seeds{"501..505"};
   std::string calibration = "both";
+  std::vector<OdometerModel> odometers;
+  bool without_camera = false;
   std::vector<double> rates{30.0};
   std::vector<std::filesystem::path> configs;
   evaluation::AlignmentKind alignment = evaluation::AlignmentKind::yaw;
@@ -87,16 +90,29 @@ std::vector<simulator::Options> simulations_of(const Arguments& args) {
   return simulations;
 }
 
-std::vector<Variant> variants_of(const Arguments& args) {
-  std::vector<Variant> settings;
-  if (args.configs.empty()) settings.push_back({true, "default", FilterConfig{}});
+/// The settings of every file, with every odometer model that was asked for.
+std::vector<Variant> settings_of(const Arguments& args) {
+  std::vector<Variant> files;
+  if (args.configs.empty()) files.push_back({true, "default", FilterConfig{}});
   for (const std::filesystem::path& file : args.configs) {
-    settings.push_back({true, file.stem().string(), load_config(file).filter});
+    files.push_back({true, file.stem().string(), load_config(file).filter});
   }
+  if (args.odometers.empty()) return files;
+  std::vector<Variant> settings;
+  for (const OdometerModel model : args.odometers) {
+    for (Variant variant : files) {
+      variant.config.odometer.model = model;
+      settings.push_back(variant);
+    }
+  }
+  return settings;
+}
+
+std::vector<Variant> variants_of(const Arguments& args) {
   std::vector<Variant> variants;
   for (const bool true_calibration : {true, false}) {
     if (args.calibration == (true_calibration ? "wrong" : "true")) continue;
-    for (Variant variant : settings) {
+    for (Variant variant : settings_of(args)) {
       variant.true_calibration = true_calibration;
       variants.push_back(variant);
     }
@@ -105,15 +121,15 @@ std::vector<Variant> variants_of(const Arguments& args) {
 }
 
 /// All variants on one simulation: the samples do not depend on the calibration told.
-std::vector<Run> run(const simulator::Options& options, const std::vector<Variant>& variants,
-                     evaluation::AlignmentKind alignment) {
+std::vector<Run> run(const simulator::Options& options, const std::vector<Variant>& variants, const Arguments& args) {
   const simulator::Simulation simulation(options);
   std::vector<Run> runs;
   for (const Variant& variant : variants) {
-    const Calibration& told = variant.true_calibration ? simulation.true_calibration() : simulation.calibration();
-    runs.push_back({{options.sequence, options.camera_rate_hz, variant.true_calibration, variant.settings},
-                    options.seed,
-                    measure(simulation, told, variant.config, alignment)});
+    Calibration told = variant.true_calibration ? simulation.true_calibration() : simulation.calibration();
+    if (args.without_camera) told.cameras.clear();
+    const Setup setup{options.sequence, options.camera_rate_hz, name_of(variant.config.odometer.model),
+                      variant.true_calibration, variant.settings};
+    runs.push_back({setup, options.seed, measure(simulation, told, variant.config, args.alignment)});
   }
   return runs;
 }
@@ -146,7 +162,7 @@ void track_accuracy(const Arguments& args) {
   std::size_t done = 0;
   tools::Progress progress;
   in_parallel(simulations.size(), args.threads, [&](std::size_t i) {
-    results[i] = run(simulations[i], variants, args.alignment);
+    results[i] = run(simulations[i], variants, args);
     const std::lock_guard<std::mutex> lock(mutex);
     progress.show(std::to_string(++done) + " of " + std::to_string(simulations.size()) + " simulations");
   });
@@ -168,6 +184,12 @@ int parse_and_run(int argc, char** argv) {
   app.add_option("--calibration", args.calibration, "that the filter is told")
       ->check(CLI::IsMember({"true", "wrong", "both"}))
       ->capture_default_str();
+  std::map<std::string, OdometerModel> models;
+  for (const auto& [name, model] : names_of(OdometerModel{})) models.emplace(name, model);
+  app.add_option("--odometer", args.odometers, "none, differential, gyro or terrain, several with commas; else as set")
+      ->delimiter(',')
+      ->transform(CLI::CheckedTransformer(models).description(""));
+  app.add_flag("--without-camera", args.without_camera, "the other sensors alone, an estimate at the camera's rate");
   app.add_option("--rate", args.rates, "of the camera [Hz], several with commas")
       ->delimiter(',')
       ->check(CLI::PositiveNumber)

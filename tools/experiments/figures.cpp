@@ -11,19 +11,34 @@ namespace {
 
 constexpr double kDegPerRad = 180.0 / M_PI;
 
+/// How many of something passed the gates.
+struct Gated {
+  int used = 0;
+  int rejected = 0;
+
+  void add(int more_used, int more_rejected) {
+    used += more_used;
+    rejected += more_rejected;
+  }
+  [[nodiscard]] std::optional<double> rejected_percent() const {
+    if (used + rejected == 0) return std::nullopt;
+    return 100.0 * rejected / (used + rejected);
+  }
+};
+
 /// What is collected while the filter runs.
 struct Record {
   evaluation::Estimate estimate;
-  double features_used = 0.0;
-  double features_rejected = 0.0;
+  Gated features, wheel_rows, beams;
   bool finite = true;
 
   void add(const Estimate& e) {
     finite = finite && e.state.p_WB.allFinite() && e.state.q_WB.coeffs().allFinite() && e.covariance.allFinite();
     if (!finite) return;
     append(estimate, e);
-    features_used += e.frame.features_used;
-    features_rejected += e.frame.features_rejected;
+    features.add(e.frame.features_used, e.frame.features_rejected);
+    wheel_rows.add(e.frame.wheel_rows_used, e.frame.wheel_rows_rejected);
+    beams.add(e.frame.beams_used, e.frame.beams_rejected);
   }
 };
 
@@ -73,7 +88,13 @@ Figures measure(const simulator::Simulation& simulation, const Calibration& cali
                 evaluation::AlignmentKind alignment) {
   Filter filter(config, calibration);
   Record record;
-  replay(simulation, filter, [&](std::size_t, const Estimate& estimate) { record.add(estimate); });
+  const auto add = [&](std::size_t, const Estimate& estimate) { record.add(estimate); };
+  if (calibration.cameras.empty()) {
+    replay_without_camera(simulation, filter, add);
+  } else {
+    replay(simulation, filter, add);
+  }
+  if (config.odometer.model == OdometerModel::none) record.estimate.terrain.clear();  // it was not asked
 
   Figures figures;
   const evaluation::Estimate& estimate = record.estimate;
@@ -88,8 +109,9 @@ Figures measure(const simulator::Simulation& simulation, const Calibration& cali
   const evaluation::PoseCovariance& last = estimate.covariance.back();
   figures.sigma_position = std::sqrt(last.topLeftCorner<3, 3>().trace());
   figures.sigma_orientation = kDegPerRad * std::sqrt(last.bottomRightCorner<3, 3>().trace());
-  const double features = record.features_used + record.features_rejected;
-  if (features > 0.0) figures.features_rejected = 100.0 * record.features_rejected / features;
+  figures.features_rejected = record.features.rejected_percent();
+  figures.wheel_rows_rejected = record.wheel_rows.rejected_percent();
+  figures.beams_rejected = record.beams.rejected_percent();
   return figures;
 }
 

@@ -31,9 +31,12 @@ struct Figures {
   std::optional<double> mode_agreement;       ///< share of the poses that agree with the truth on ground or air [%]
   std::optional<double> coverage;             ///< frames with an estimate [%]
   std::optional<double> features_rejected;    ///< share of the features tried [%]
+  std::optional<double> wheel_rows_rejected;  ///< share of the odometer's rows [%]
+  std::optional<double> beams_rejected;       ///< share of the laser ranges [%]
 };
 
-/// Runs a new filter that is told `calibration`. A run whose estimate stops being finite keeps only its coverage.
+/// Runs a new filter that is told `calibration`; without cameras in it, without images. A run whose estimate stops
+/// being finite keeps only its coverage.
 [[nodiscard]] Figures measure(const simulator::Simulation& simulation, const Calibration& calibration,
                               const FilterConfig& config, evaluation::AlignmentKind alignment);
 

@@ -19,4 +19,7 @@ using OnEstimate = std::function<void(std::size_t frame, const Estimate& estimat
 void replay(const simulator::Simulation& simulation, Filter& filter, const OnEstimate& on_estimate,
             const ChangeFrame& change = {});
 
+/// Feeds the samples of all other sensors, and asks for an estimate where a frame would be.
+void replay_without_camera(const simulator::Simulation& simulation, Filter& filter, const OnEstimate& on_estimate);
+
 }  // namespace ear::experiments

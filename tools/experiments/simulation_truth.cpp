@@ -40,6 +40,12 @@ void append(evaluation::Estimate& to, const Estimate& estimate) {
       block(estimate_error::rotation, estimate_error::position),
       block(estimate_error::rotation, estimate_error::rotation);
   to.covariance.push_back(P);
+  evaluation::TerrainEstimate ground;
+  ground.on_ground = estimate.frame.on_ground;
+  const TerrainEstimate& terrain = estimate.terrain;
+  if (terrain.known) ground.slope = evaluation::Slope{terrain.slope_along, terrain.slope_across};
+  ground.sigma = {terrain.sigma_along, terrain.sigma_across};
+  to.terrain.push_back(ground);
 }
 
 }  // namespace ear::experiments

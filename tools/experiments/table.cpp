@@ -34,7 +34,7 @@ struct NamedField {
   Field field;
 };
 
-constexpr std::array<NamedField, 18> kFields{{
+constexpr std::array<NamedField, 20> kFields{{
     {"length_m", &Figures::length},
     {"ate_rmse_m", &Figures::ate_rmse},
     {"ate_percent", &Figures::ate_percent},
@@ -53,6 +53,8 @@ constexpr std::array<NamedField, 18> kFields{{
     {"mode_agreement_percent", &Figures::mode_agreement},
     {"coverage_percent", &Figures::coverage},
     {"features_rejected_percent", &Figures::features_rejected},
+    {"wheel_rows_rejected_percent", &Figures::wheel_rows_rejected},
+    {"beams_rejected_percent", &Figures::beams_rejected},
 }};
 
 struct Column {
@@ -63,7 +65,7 @@ struct Column {
 
 double median_of(const Values& values) { return median(values); }
 
-constexpr std::array<Column, 20> kColumns{{
+constexpr std::array<Column, 22> kColumns{{
     {"length [m]", &Figures::length, median_of},
     {"ATE [m]", &Figures::ate_rmse, median_of},
     {"worst", &Figures::ate_rmse, worst},
@@ -83,7 +85,9 @@ constexpr std::array<Column, 20> kColumns{{
     {"in 3 sigma [%]", &Figures::slope_across_inside, mean},
     {"mode right [%]", &Figures::mode_agreement, mean},
     {"coverage [%]", &Figures::coverage, mean},
-    {"rejected [%]", &Figures::features_rejected, mean},
+    {"features rejected [%]", &Figures::features_rejected, mean},
+    {"wheel rows", &Figures::wheel_rows_rejected, mean},
+    {"beams", &Figures::beams_rejected, mean},
 }};
 
 /// Three significant digits, whole numbers from 1000 on.
@@ -95,7 +99,7 @@ std::string number_text(double value) {
 
 bool same(const Setup& a, const Setup& b) {
   const auto tie = [](const Setup& s) {
-    return std::tie(s.sequence, s.camera_rate_hz, s.true_calibration, s.settings);
+    return std::tie(s.sequence, s.camera_rate_hz, s.odometer, s.true_calibration, s.settings);
   };
   return tie(a) == tie(b);
 }
@@ -132,8 +136,8 @@ std::string to_markdown(const std::vector<Run>& runs) {
   std::copy_if(kColumns.begin(), kColumns.end(), std::back_inserter(columns),
                [&](const Column& column) { return !values_of(runs, column.field).empty(); });
 
-  std::string text = "| sequence | Hz | calibration | settings | seeds |";
-  std::string rule = "|---|---|---|---|---|";
+  std::string text = "| sequence | Hz | odometer | calibration | settings | seeds |";
+  std::string rule = "|---|---|---|---|---|---|";
   for (const Column& column : columns) {
     text += std::string(" ") + column.label + " |";
     rule += "---|";
@@ -142,8 +146,8 @@ std::string to_markdown(const std::vector<Run>& runs) {
   for (const std::vector<Run>& row : rows_of(runs)) {
     const Setup& setup = row.front().setup;
     const std::size_t estimated = values_of(row, &Figures::ate_rmse).size();
-    text += "| " + setup.sequence + " | " + number_text(setup.camera_rate_hz) + " | " + calibration_text(setup) +
-            " | " + setup.settings + " | ";
+    text += "| " + setup.sequence + " | " + number_text(setup.camera_rate_hz) + " | " + setup.odometer + " | " +
+            calibration_text(setup) + " | " + setup.settings + " | ";
     text += (estimated < row.size() ? std::to_string(estimated) + " of " : "") + std::to_string(row.size()) + " |";
     for (const Column& column : columns) {
       const Values values = values_of(row, column.field);
@@ -157,11 +161,9 @@ std::string to_markdown(const std::vector<Run>& runs) {
 std::string to_json(const std::vector<Run>& runs) {
   Json list = Json::array();
   for (const Run& run : runs) {
-    Json item{{"sequence", run.setup.sequence},
-              {"camera_rate_hz", run.setup.camera_rate_hz},
-              {"calibration", calibration_text(run.setup)},
-              {"settings", run.setup.settings},
-              {"seed", run.seed}};
+    Json item{{"sequence", run.setup.sequence}, {"camera_rate_hz", run.setup.camera_rate_hz},
+              {"odometer", run.setup.odometer}, {"calibration", calibration_text(run.setup)},
+              {"settings", run.setup.settings}, {"seed", run.seed}};
     for (const NamedField& field : kFields) {
       const std::optional<double>& value = run.figures.*field.field;
       item[field.key] = value ? Json(*value) : Json(nullptr);
