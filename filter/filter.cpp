@@ -13,6 +13,8 @@ namespace {
 
 constexpr std::size_t kImuCapacity = 4096;   // 20 s at 200 Hz, 4 s at 1 kHz
 constexpr std::size_t kWheelCapacity = 512;  // readings that wait for the state to pass them
+constexpr double kSpinUp = 0.1;              // [s] after a touchdown until the wheels roll
+constexpr double kSlipEnds = 0.15;           // [s] of agreement before a row that failed its gate is used again
 constexpr double kTooLate = 0.1;             // [s] behind the state: a reading that comes so late is not used
 constexpr double kWheelAge = 0.1;            // [s] older readings do not tell whether the wheels rest
 constexpr double kHeldSample = 0.02;         // [s] so far the newest IMU sample may stand in for one that is missing
@@ -109,6 +111,7 @@ Filter::Filter(const FilterConfig& config, const Calibration& calibration)
       imu_(kImuCapacity),
       turns_(kWheelCapacity),
       ranges_(kWheelCapacity),
+      contact_(config.contact, calibration),
       standstill_(config.standstill, focal_px_),
       information_(config.window + 1, config.max_track_updates) {
   state_.camera = camera_state(calibration);
@@ -143,6 +146,18 @@ void Filter::add_imu(const ImuSample& sample) {
     advance(imu_[kImuCapacity / 2].t_ns);
   }
   imu_.push(sample);
+  if (encoder_) note_contact(contact_.add_imu(sample));
+}
+
+/// After a change of the ground under the wheels nothing is known of it.
+void Filter::note_contact(ContactEvent event) {
+  if (event != ContactEvent::none) ground_known_ = false;
+}
+
+/// Do the wheels tell how the vehicle moves? Not in the air, and not while they are spun up by the ground.
+bool Filter::rolls_at(TimeNs t_ns) const {
+  const std::optional<TimeNs> since_ns = contact_.since_ns();
+  return on_ground() && (!since_ns || seconds_between(*since_ns, t_ns) > kSpinUp);
 }
 
 void Filter::add_encoder(const EncoderSample& sample) {
@@ -151,6 +166,7 @@ void Filter::add_encoder(const EncoderSample& sample) {
     ++counts_.encoder_rejected;
     return;
   }
+  note_contact(contact_.add_encoder(sample));
   const std::optional<WheelTurn> turn = encoder_->add(sample);
   if (!turn) return;
   wheel_rest_.add(*turn);
@@ -171,6 +187,7 @@ void Filter::add_laser(const LaserSample& sample) {
     return;
   }
   last_range_ns_ = sample.t_ns;
+  note_contact(contact_.add_laser(sample));
   if (status_ != Status::tracking) return;
   if (ranges_.full()) advance_measuring(ranges_.front().t_ns);
   BeamRanges reading;
@@ -251,7 +268,9 @@ bool Filter::begin_frame(const FeatureFrame& frame) {
   const ImuStatistics imu = imu_.statistics(t_ns - static_cast<TimeNs>(1e9 * config_.standstill.duration), t_ns);
   const bool still = standstill_.update(frame, imu, started ? state_.imu.b_g : Eigen::Vector3d::Zero(),
                                         started ? config_.standstill.max_gyro : config_.standstill.max_gyro_at_start,
-                                        wheel_rest_.duration(t_ns, kWheelAge));
+                                        on_ground() ? wheel_rest_.duration(t_ns, kWheelAge) : std::nullopt);
+  contact_.set_gyro_bias(state_.imu.b_g);
+  statistics_.on_ground = on_ground();
   if (started || try_start(t_ns, imu, still)) advance_measuring(t_ns);
   return still;
 }
@@ -372,7 +391,18 @@ Filter::Motion Filter::motion_at(TimeNs t_ns) const {
   return motion;
 }
 
+/// A wheel that slips comes back through the speeds that the gate lets pass: it must have agreed for a while.
+bool Filter::agrees_again(TimeNs& since_ns, bool passes, TimeNs t_ns) {
+  if (!passes) {
+    since_ns = kDisagrees;
+    return false;
+  }
+  if (since_ns == kDisagrees) since_ns = t_ns;
+  return seconds_between(since_ns, t_ns) >= kSlipEnds;
+}
+
 void Filter::update_with_wheels(const WheelTurn& turn) {
+  if (!rolls_at(turn.from_ns)) return;
   const OdometerConfig& odometer = config_.odometer;
   const double dt = turn.duration();
   const Motion motion = motion_at(turn.from_ns + (turn.to_ns - turn.from_ns) / 2);
@@ -408,7 +438,8 @@ void Filter::update_with_wheels(const WheelTurn& turn) {
   for (int row = 0; row < WheelRows::size; ++row) {
     if (!use[static_cast<std::size_t>(row)]) continue;
     const double variance = covariance_.variance(rows.H.row(row), err::nu) + sigma(row) * sigma(row);
-    if (!(rows.residual(row) * rows.residual(row) <= gate_(1) * variance)) {
+    const bool passes = rows.residual(row) * rows.residual(row) <= gate_(1) * variance;
+    if (!agrees_again(agrees_since_ns_[static_cast<std::size_t>(row)], passes, turn.to_ns)) {
       ++statistics_.wheel_rows_rejected;
       continue;
     }
@@ -420,7 +451,7 @@ void Filter::update_with_wheels(const WheelTurn& turn) {
 }
 
 void Filter::update_with_beams(const BeamRanges& reading) {
-  if (config_.odometer.model != OdometerModel::terrain) return;
+  if (config_.odometer.model != OdometerModel::terrain || !on_ground()) return;
   const LaserCalibration& lasers = *calibration_.lasers;
   const Motion motion = motion_at(reading.t_ns);
   if (!ground_known_) restart_ground(reading, motion.R_WB);

@@ -15,6 +15,7 @@
 #include "ear/odometry.h"
 #include "ear/types.h"
 #include "filter/chi_squared.h"
+#include "filter/contact.h"
 #include "filter/covariance.h"
 #include "filter/feature_update.h"
 #include "filter/imu_buffer.h"
@@ -79,6 +80,8 @@ class Filter {
     Eigen::Vector3d v_W;
   };
 
+  static constexpr TimeNs kDisagrees = -1;
+
   [[nodiscard]] TimeNs imu_time(TimeNs camera_time_ns) const;
   bool try_start(TimeNs t_ns, const ImuStatistics& imu, bool still);
   [[nodiscard]] Eigen::VectorXd start_sigma() const;
@@ -86,6 +89,10 @@ class Filter {
   void advance(TimeNs t_ns);
   void advance_measuring(TimeNs t_ns);
   [[nodiscard]] Motion motion_at(TimeNs t_ns) const;
+  void note_contact(ContactEvent event);
+  [[nodiscard]] bool on_ground() const { return encoder_ && contact_.mode() == ContactMode::ground; }
+  [[nodiscard]] bool rolls_at(TimeNs t_ns) const;
+  static bool agrees_again(TimeNs& since_ns, bool passes, TimeNs t_ns);
   void update_with_wheels(const WheelTurn& turn);
   void update_with_beams(const BeamRanges& reading);
   void restart_ground(const BeamRanges& reading, const Eigen::Matrix3d& R_WB);
@@ -118,6 +125,8 @@ class Filter {
   Ring<BeamRanges> ranges_;  ///< the same
   TimeNs last_range_ns_ = 0;
   bool ground_known_ = false;  ///< the lasers saw the ground since it was last touched
+  ContactDetector contact_;
+  std::array<TimeNs, WheelRows::size> agrees_since_ns_{};  ///< each row of the odometer with the state; kDisagrees
   WheelRest wheel_rest_;
   StandstillDetector standstill_;
   TrackTable tracks_;

@@ -58,12 +58,24 @@ struct OdometerConfig {
   double slip = 1e-3;            ///< along the track [m/sqrt(m)]
   double side_slip = 2e-3;       ///< across it [m/sqrt(m)]
   double side_slip_turn = 5e-3;  ///< across it, while turning [m/s per rad/s]
-  double roughness = 2e-3;       ///< through the ground [m/sqrt(m)]
+  double roughness = 4e-3;       ///< through the ground [m/sqrt(m)]
   double speed_sigma = 1e-3;     ///< [m/s] every row, also of standing wheels
   double yaw_rate_sigma = 0.02;  ///< [rad/s]
   double normal_walk = 0.1;      ///< how the ground's normal turns [rad/sqrt(m)]
   double normal_prior = 0.3;     ///< [rad] before the lasers saw it
-  double unevenness = 0.004;     ///< [m] of the ground under a beam against the plane through the wheels
+  double unevenness = 0.008;     ///< [m] of the ground under a beam against the plane through the wheels
+};
+
+/// When the vehicle is on the ground, and when it flies.
+struct ContactConfig {
+  double takeoff_height = 0.005;     ///< [m] wheels above the ground, after standing, that are a take-off
+  double unevenness = 0.025;         ///< [m] on top of it while they roll
+  double takeoff_duration = 0.04;    ///< [s] for which the beams must say so
+  double touchdown_height = 0.025;   ///< [m] wheels below it, neither rising nor falling, stand on the ground
+  double touchdown_duration = 0.2;   ///< [s] for which the beams must say so
+  double touchdown_climb = 0.06;     ///< [m/s] neither rising nor falling
+  double confirmed_height = 0.05;    ///< [m] below it a strike, or wheels that are spun up, is a touchdown at once
+  double strike = 10.0;              ///< [m/s^2] change of the specific force's magnitude
 };
 
 struct FilterConfig {
@@ -78,6 +90,7 @@ struct FilterConfig {
   StandstillConfig standstill;
   OnlineCalibrationConfig online_calibration;
   OdometerConfig odometer;
+  ContactConfig contact;
 };
 
 }  // namespace ear

@@ -94,6 +94,18 @@ EnableFor<C, OdometerConfig> visit(C& c, F&& f) {
 }
 
 template <typename C, typename F>
+EnableFor<C, ContactConfig> visit(C& c, F&& f) {
+  f("takeoff_height", c.takeoff_height);
+  f("unevenness", c.unevenness);
+  f("takeoff_duration", c.takeoff_duration);
+  f("touchdown_height", c.touchdown_height);
+  f("touchdown_duration", c.touchdown_duration);
+  f("touchdown_climb", c.touchdown_climb);
+  f("confirmed_height", c.confirmed_height);
+  f("strike", c.strike);
+}
+
+template <typename C, typename F>
 EnableFor<C, FilterConfig> visit(C& c, F&& f) {
   f("window", c.window);
   f("max_track_updates", c.max_track_updates);
@@ -106,6 +118,7 @@ EnableFor<C, FilterConfig> visit(C& c, F&& f) {
   f("standstill", c.standstill);
   f("online_calibration", c.online_calibration);
   f("odometer", c.odometer);
+  f("contact", c.contact);
 }
 
 template <typename C, typename F>

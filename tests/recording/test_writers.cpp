@@ -24,6 +24,7 @@ Estimate numbered_estimate() {
     for (int j = 0; j < estimate_error::size; ++j) e.covariance(i, j) = 100 * std::min(i, j) + std::max(i, j);
   }
   e.frame = {60, 61, 62, 63, 64, 65, 66, 67, 68, true, true};
+  e.terrain = {true, 0.6, 0.7, 0.8, 0.9};
   return e;
 }
 

@@ -172,7 +172,10 @@ std::vector<TerrainTruth> read_terrain(const fs::path& recording) {
   constexpr std::array<const char*, 4> kNames{"timestamp [ns]", "mode [0 ground 1 air]", "slope_along [rad]",
                                               "slope_across [rad]"};
   std::array<std::size_t, 4> columns{};
-  for (std::size_t i = 0; i < kNames.size(); ++i) columns[i] = table.required_column(kNames[i]);
+  for (std::size_t i = 0; i < kNames.size(); ++i) {
+    if (!table.column(kNames[i])) return {};  // somebody else's file of that name
+    columns[i] = *table.column(kNames[i]);
+  }
   std::vector<TerrainTruth> terrain;
   for (const Row& row : table.rows()) {
     const TerrainTruth truth{table.time(row, columns[0], kNames[0], 0),

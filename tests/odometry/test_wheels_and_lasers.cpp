@@ -1,0 +1,106 @@
+// Wheels and lasers in the filter, on simulated feature tracks: what they must bring, and what they must survive.
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tests/support/simulated_run.h"
+
+using namespace ear;
+
+namespace {
+
+simulator::Simulation simulate(const char* sequence, std::uint64_t seed, double duration) {
+  simulator::Options options;
+  options.sequence = sequence;
+  options.seed = seed;
+  if (duration > 0.0) options.duration = duration;
+  return simulator::Simulation(options);
+}
+
+struct Errors {
+  double position = 0.0;  ///< RMS, from the common start on [m]
+  double end = 0.0;       ///< last one [m]
+  double slope = 0.0;     ///< RMS of both angles [rad]
+  double inside = 0.0;    ///< share of the slopes within three standard deviations
+  double mode = 0.0;      ///< share of the estimates that know whether the vehicle is on the ground
+};
+
+Errors run(const simulator::Simulation& simulation, OdometerModel model,
+           const std::function<void(FeatureFrame&)>& change = {}) {
+  FilterConfig config;
+  config.odometer.model = model;
+  Filter filter(config, simulation.calibration());
+  Errors errors;
+  double slopes = 0.0;
+  const auto estimates = test::run_filter(filter, simulation, change);
+  for (const test::EvaluatedEstimate& e : estimates) {
+    errors.position += e.dp_W.squaredNorm();
+    const simulator::Truth truth = simulation.truth(e.estimate.state.t_ns);
+    errors.mode += e.estimate.frame.on_ground == (truth.mode == simulator::Mode::ground) ? 1.0 : 0.0;
+    const TerrainEstimate& ground = e.estimate.terrain;
+    if (!ground.known || truth.mode != simulator::Mode::ground) continue;
+    const double along = ground.slope_along - truth.slope_along;
+    const double across = ground.slope_across - truth.slope_across;
+    errors.slope += along * along + across * across;
+    errors.inside += std::abs(along) < 3.0 * ground.sigma_along ? 1.0 : 0.0;
+    errors.inside += std::abs(across) < 3.0 * ground.sigma_across ? 1.0 : 0.0;
+    slopes += 2.0;
+  }
+  REQUIRE(!estimates.empty());
+  const auto count = static_cast<double>(estimates.size());
+  errors.position = std::sqrt(errors.position / count);
+  errors.end = estimates.back().dp_W.norm();
+  errors.mode /= count;
+  if (slopes > 0.0) {
+    errors.slope = std::sqrt(errors.slope / slopes);
+    errors.inside /= slopes;
+  }
+  return errors;
+}
+
+constexpr double kDegree = M_PI / 180.0;
+
+}  // namespace
+
+TEST_CASE("wheels and lasers: waves are driven better than by camera and IMU alone, and their slope is known") {
+  const simulator::Simulation simulation = simulate("wave1", 811, 40.0);
+  const Errors with = run(simulation, OdometerModel::terrain);
+  CHECK(with.position < run(simulation, OdometerModel::none).position);
+  CHECK(with.position < 0.02);
+  CHECK(with.slope < 1.0 * kDegree);
+  CHECK(with.inside > 0.99);
+  CHECK(with.mode > 0.98);
+}
+
+TEST_CASE("wheels and lasers: the models differ as in the paper's Table II") {
+  const simulator::Simulation simulation = simulate("lawn", 812, 40.0);
+  const double terrain = run(simulation, OdometerModel::terrain).position;
+  CHECK(terrain < run(simulation, OdometerModel::gyro).position);
+  CHECK(terrain < run(simulation, OdometerModel::differential).position);
+}
+
+TEST_CASE("wheels and lasers: with the lens covered they carry on") {
+  const simulator::Simulation simulation = simulate("flat1", 813, 40.0);
+  const TimeNs covered_ns = simulation.frame_times().front() + 4'000'000'000;
+  const auto cover = [&](FeatureFrame& frame) {
+    if (frame.t_ns > covered_ns) frame.features.clear();
+  };
+  CHECK(run(simulation, OdometerModel::terrain, cover).position < 0.2);
+  CHECK(run(simulation, OdometerModel::none, cover).position > 1.0);
+}
+
+TEST_CASE("wheels and lasers: a body that swings on standing wheels does not move them") {
+  CHECK(run(simulate("sway1", 814, 0.0), OdometerModel::terrain).end < 0.005);
+}
+
+TEST_CASE("wheels and lasers: wheels that spin idly are not believed, and believed again when they stop") {
+  CHECK(run(simulate("sway3", 815, 0.0), OdometerModel::terrain).position < 0.03);
+}
+
+TEST_CASE("wheels and lasers: no odometer in the air, and again after the landing") {
+  const simulator::Simulation simulation = simulate("fly1", 816, 0.0);
+  const Errors with = run(simulation, OdometerModel::terrain);
+  CHECK(with.mode > 0.95);
+  CHECK(with.position < 0.05);
+}
