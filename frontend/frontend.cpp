@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "frontend/detector.h"
+#include "frontend/facet.h"
 #include "frontend/flow_check.h"
 #include "frontend/image_pyramid.h"
 #include "frontend/image_quality.h"
@@ -23,7 +24,6 @@ constexpr float kEdgePx = 8.0F;              // features closer to the image's e
 constexpr float kMinTrackDistancePx = 5.0F;  // two tracks closer than this have become one
 constexpr double kFlowTolerancePx = 1.0;
 constexpr double kDisparitySigmaPx = 1.0;  // for the depth's part of that tolerance
-constexpr double kMapStepPx = 4.0;         // of the finite differences of a predicted affine map
 constexpr int kLevelMeasured = 0;          // where to begin: with depth and a motion measured in this frame,
 constexpr int kLevelPredicted = 2;         // with a predicted rotation,
 constexpr int kLevelUnknown = ImagePyramid::kMaxLevels - 1;  // and without
@@ -36,9 +36,8 @@ struct Track {
   std::size_t patch = 0;  // index into the store
   Warp left;              // of the reference patch
   Eigen::Vector2d left_ray = Eigen::Vector2d::Zero();
-  bool has_depth = false;      // known from this or an earlier frame
-  double inverse_depth = 0.0;  // 1/z in the left camera of this frame
-  Eigen::Matrix2f right_from_left = Eigen::Matrix2f::Identity();
+  bool has_depth = false;  // known from this or an earlier frame
+  Facet facet;             // in the left camera of this frame; at infinity without depth
   bool has_right = false;  // seen by the right camera in this frame
   Eigen::Vector2d right_ray = Eigen::Vector2d::Zero();
 };
@@ -223,27 +222,9 @@ MotionGuess Frontend::Impl::track_probes(const MotionGuess& guess, std::vector<s
 }
 
 bool Frontend::Impl::track_one(Track& track, const Transfer& motion, int level) const {
-  const double inverse_depth = track.has_depth ? track.inverse_depth : 0.0;
-  const auto move = [&](const Eigen::Vector2d& ray) -> std::optional<Eigen::Vector2d> {
-    const Eigen::Vector3d point = motion.scaled_point(ray, inverse_depth);
-    if (!(point.z() > 1e-3)) return std::nullopt;
-    return lens_.to_pixel(point.hnormalized());
-  };
-  const auto centre = move(track.left_ray);
-  if (!centre) return false;
-  Warp start{centre->cast<float>(), track.left.affine};
-  const Eigen::Vector2d pixel = track.left.centre.cast<double>();
-  const auto ray_right = lens_.to_normalized(pixel + Eigen::Vector2d(kMapStepPx, 0.0));
-  const auto ray_below = lens_.to_normalized(pixel + Eigen::Vector2d(0.0, kMapStepPx));
-  const auto right = ray_right ? move(*ray_right) : std::nullopt;
-  const auto below = ray_below ? move(*ray_below) : std::nullopt;
-  if (right && below) {
-    Eigen::Matrix2d change;
-    change << (*right - *centre) / kMapStepPx, (*below - *centre) / kMapStepPx;
-    start.affine = change.cast<float>() * track.left.affine;
-  }
-
-  const auto match = patches_[track.patch].align(left_, start, level);
+  const auto start = carry_over(track.left, track.left_ray, track.facet, motion, lens_, lens_);
+  if (!start) return false;
+  const auto match = patches_[track.patch].align(left_, *start, level);
   if (!match) return false;
   const Eigen::Vector2f& found = match->warp.centre;
   const GreyLevel& image = left_.level(0);
@@ -253,7 +234,7 @@ bool Frontend::Impl::track_one(Track& track, const Transfer& motion, int level) 
   if (!in(found.x(), image.width) || !in(found.y(), image.height)) return false;
   const auto ray = lens_.to_normalized(found.cast<double>());
   if (!ray) return false;
-  track.inverse_depth = inverse_depth / motion.scaled_point(track.left_ray, inverse_depth).z();
+  track.facet = track.facet.seen_after(motion, track.left_ray, *ray);
   track.left = match->warp;
   track.left_ray = *ray;
   track.has_right = false;
@@ -264,7 +245,8 @@ bool Frontend::Impl::track_one(Track& track, const Transfer& motion, int level) 
 Flow Frontend::Impl::flow(std::size_t track) const {
   const Track& before = previous_[track];
   const double sigma = stereo_ ? kDisparitySigmaPx * stereo_->inverse_depth_per_pixel() : 0.0;
-  return {before.left_ray, tracks_[track].left_ray, before.inverse_depth, sigma, before.has_depth};
+  return {before.left_ray, tracks_[track].left_ray, before.facet.inverse_depth(before.left_ray), sigma,
+          before.has_depth};
 }
 
 void Frontend::Impl::reject() {
@@ -283,7 +265,7 @@ void Frontend::Impl::match_stereo(Track& track, bool had_right) {
   const ReferencePatch& patch = patches_[track.patch];
   std::optional<StereoMatch> match;
   if (track.has_depth) {
-    match = stereo_->follow(right_, patch, track.left, track.left_ray, track.inverse_depth, track.right_from_left);
+    match = stereo_->follow(right_, patch, track.left, track.left_ray, track.facet);
   }
   // The search is expensive, and mostly fails where it has failed before: try again at ages 0, 1, 2, 4, 8, ...
   const bool due = (track.age & (track.age - 1)) == 0;
@@ -291,9 +273,8 @@ void Frontend::Impl::match_stereo(Track& track, bool had_right) {
   track.has_right = match.has_value();
   if (!match) return;
   track.has_depth = true;
-  track.inverse_depth = match->inverse_depth;
+  track.facet = match->facet;
   track.right_ray = match->right;
-  track.right_from_left = match->right_from_left;
 }
 
 void Frontend::Impl::refresh_patches() {
@@ -301,7 +282,7 @@ void Frontend::Impl::refresh_patches() {
     const float area = track.left.affine.determinant();
     const bool stretched = area > kRefreshStretch * kRefreshStretch || area * kRefreshStretch * kRefreshStretch < 1.0F;
     if (!stretched) continue;
-    if (patches_[track.patch].capture(left_, track.left.centre)) track.left.affine.setIdentity();
+    if (patches_[track.patch].capture(left_, track.left.centre)) track.left = {track.left.centre};
   }
 }
 

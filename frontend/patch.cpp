@@ -34,7 +34,8 @@ float blend(int pair, float weight) {
 
 // Whether all offsets up to `half` from the centre can be interpolated.
 bool inside(const GreyLevel& level, const Warp& warp, float half) {
-  const Eigen::Vector2f reach = half * warp.affine.cwiseAbs().rowwise().sum();
+  const float widest = 1.0F + half * warp.perspective.cwiseAbs().sum();
+  const Eigen::Vector2f reach = half * widest * warp.affine.cwiseAbs().rowwise().sum();
   const float low = -static_cast<float>(level.border);
   const float high_x = static_cast<float>(level.width + level.border) - 2.0F;
   const float high_y = static_cast<float>(level.height + level.border) - 2.0F;
@@ -49,24 +50,38 @@ template <int n, int skip = 0>
 void sample(const GreyLevel& level, const Warp& warp, float* out) {
   constexpr float kReach = 0.5F * (n - 1);
   constexpr float kScale = 1.0F / static_cast<float>(kFixedOne);
-  const Eigen::Vector2f start = warp.centre - kReach * warp.affine.rowwise().sum();
-  const int step_x = to_fixed(warp.affine(0, 0));
-  const int step_y = to_fixed(warp.affine(1, 0));
+  // With o = (column - kReach, y): affine o (1 - perspective . o), in powers of the column.
+  const Eigen::Vector2f ax = warp.affine.col(0);
+  const Eigen::Vector2f ay = warp.affine.col(1);
+  const float lx = warp.perspective.x();
+  const float ly = warp.perspective.y();
   const std::ptrdiff_t stride = level.stride;
   const std::uint8_t* origin = level.origin - kOffset * (stride + 1);
+  const Eigen::Vector2f bend = -lx * ax;
+  const Eigen::Vector2f twist = -(ly * ax + lx * ay);  // change of the step from row to row
+  const float top_y = static_cast<float>(skip) - kReach;
+  const Eigen::Vector2f step = ax + kReach * lx * ax + kReach * lx * ax + top_y * twist;
   std::array<int, n> along_x, along_y;  // from the first pixel of a row
+  std::array<int, n> twist_x, twist_y;  // their change from row to row
   for (int i = 0; i < n; ++i) {
-    along_x[static_cast<std::size_t>(i)] = i * step_x;
-    along_y[static_cast<std::size_t>(i)] = i * step_y;
+    const auto at = static_cast<std::size_t>(i);
+    const auto column = static_cast<float>(i);
+    along_x[at] = to_fixed(column * (step.x() + column * bend.x()));
+    along_y[at] = to_fixed(column * (step.y() + column * bend.y()));
+    twist_x[at] = to_fixed(column * twist.x());
+    twist_y[at] = to_fixed(column * twist.y());
   }
   std::array<int, n> x, y, above, below;  // the last two: pairs of neighbouring pixels
   for (int row = skip; row < n - skip; ++row, out += n) {
-    const Eigen::Vector2f first = start + static_cast<float>(row) * warp.affine.col(1);
+    const float offset_y = static_cast<float>(row) - kReach;
+    const Eigen::Vector2f first = warp.centre + (offset_y * ay - kReach * ax) * (1.0F + kReach * lx - offset_y * ly);
     const int first_x = to_fixed(first.x() + static_cast<float>(kOffset));
     const int first_y = to_fixed(first.y() + static_cast<float>(kOffset));
     for (std::size_t i = 0; i < n; ++i) {
       x[i] = first_x + along_x[i];
       y[i] = first_y + along_y[i];
+      along_x[i] += twist_x[i];
+      along_y[i] += twist_y[i];
     }
     for (std::size_t i = 0; i < n; ++i) {
       const std::uint8_t* p = origin + (y[i] >> kFixedBits) * stride + (x[i] >> kFixedBits);
@@ -176,7 +191,7 @@ float smaller_eigenvalue(const Eigen::Matrix2f& m) {
 bool PatchLevel::capture(const GreyLevel& level, const Eigen::Vector2f& centre) {
   constexpr int kReach = 2;  // of the derivative filter
   constexpr int kWide = kSize + 2 * kReach;
-  const Warp warp{centre, Eigen::Matrix2f::Identity()};
+  const Warp warp{centre};
   if (!inside(level, warp, kHalf + kReach)) return false;
   alignas(16) std::array<float, kWide * kWide> wide;
   sample<kWide>(level, warp, wide.data());

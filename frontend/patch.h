@@ -12,10 +12,12 @@
 
 namespace ear {
 
-/// Where a patch lies in an image: the pixel of its centre, and the affine map from patch to image around it.
+/// Where a patch lies in an image: an offset o from its centre is seen at centre + affine o / (1 + perspective . o), as
+/// two cameras see a plane. Only centre and affine map are ever estimated; the perspective is known from the motion.
 struct Warp {
-  Eigen::Vector2f centre = Eigen::Vector2f::Zero();      ///< [px]
-  Eigen::Matrix2f affine = Eigen::Matrix2f::Identity();  ///< patch offset to image offset
+  Eigen::Vector2f centre = Eigen::Vector2f::Zero();       ///< [px]
+  Eigen::Matrix2f affine = Eigen::Matrix2f::Identity();   ///< patch offset to image offset, at the centre
+  Eigen::Vector2f perspective = Eigen::Vector2f::Zero();  ///< how the scale shrinks along the patch [1/px]
 };
 
 /// A patch at one level of a pyramid. Offsets of its pixels from the centre are -7.5, -6.5, ... 7.5.

@@ -16,7 +16,10 @@ constexpr float kMaxUnsettled = 0.1F;  // [px] a last step this long is still a 
 constexpr float kMinScale = 0.3F;      // of steps that overshoot
 constexpr float kMaxStretch = 2.5F;    // of the affine map: beyond, the patch is no longer what it was
 
-Warp scaled(const Warp& warp, int level) { return {warp.centre / static_cast<float>(1 << level), warp.affine}; }
+Warp scaled(const Warp& warp, int level) {
+  const auto size = static_cast<float>(1 << level);
+  return {warp.centre / size, warp.affine, warp.perspective * size};
+}
 
 bool plausible(const Eigen::Matrix2f& affine) {
   const float area = affine.determinant();

@@ -20,7 +20,6 @@ constexpr double kMaxEpipolarPx = 2.5;         // calibrations are off by more t
 constexpr double kMinDisparityPx = -0.7;       // noise of a point at infinity
 constexpr double kMaxDepthJumpPx = 1.5;        // disparity against what was carried over, plus
 constexpr double kMaxDepthJumpShare = 0.1;     // this share of the disparity
-constexpr double kMapStepPx = 4.0;             // of the finite differences of an affine map
 
 }  // namespace
 
@@ -42,50 +41,52 @@ std::optional<Eigen::Vector2d> StereoMatcher::project(const Eigen::Vector2d& lef
   return right_lens_.to_pixel(point.hnormalized());
 }
 
-Eigen::Matrix2f StereoMatcher::predicted_map(const Eigen::Vector2d& left_pixel, double inverse_depth) const {
-  const auto map = [&](const Eigen::Vector2d& pixel) -> std::optional<Eigen::Vector2d> {
-    const auto ray = left_lens_.to_normalized(pixel);
-    return ray ? project(*ray, inverse_depth) : std::nullopt;
-  };
-  const auto centre = map(left_pixel);
-  const auto right = map(left_pixel + Eigen::Vector2d(kMapStepPx, 0.0));
-  const auto below = map(left_pixel + Eigen::Vector2d(0.0, kMapStepPx));
-  if (!centre || !right || !below) return Eigen::Matrix2f::Identity();
-  Eigen::Matrix2d affine;
-  affine << (*right - *centre) / kMapStepPx, (*below - *centre) / kMapStepPx;
-  return affine.cast<float>();
-}
-
-std::optional<StereoMatch> StereoMatcher::accept(const ReferencePatch::Match& match, const Warp& left_warp,
-                                                 const Eigen::Vector2d& left) const {
+// `start` is what `facet` made expect. Where the patch came out more sheared than that along the epipolar line, the
+// facet leans more.
+std::optional<StereoMatch> StereoMatcher::accept(const ReferencePatch::Match& match, const Warp& start,
+                                                 const Warp& left_warp, const Eigen::Vector2d& left,
+                                                 const Facet& facet) const {
   const auto right = right_lens_.to_normalized(match.warp.centre.cast<double>());
   if (!right) return std::nullopt;
   const auto point = intersect(right_from_left_, left, *right);
   if (!point) return std::nullopt;
   if (point->epipolar_distance * right_lens_.focal_px() > kMaxEpipolarPx) return std::nullopt;
   if (point->inverse_depth < kMinDisparityPx * inverse_depth_per_pixel_) return std::nullopt;
-  return StereoMatch{*right, std::max(point->inverse_depth, 0.0), match.warp.affine * left_warp.affine.inverse()};
+
+  const Eigen::Matrix2d unexpected = ((match.warp.affine - start.affine) * left_warp.affine.inverse()).cast<double>();
+  const Eigen::Vector2d slope = right_from_left_.p_10.head<2>() - *right * right_from_left_.p_10.z();
+  const double focal_ratio = left_lens_.focal_px() / right_lens_.focal_px();
+  const Eigen::Vector2d gradient =
+      facet.gradient() + focal_ratio * unexpected.transpose() * slope / slope.squaredNorm();
+  return StereoMatch{*right, Facet::through(left, std::max(point->inverse_depth, 0.0), gradient)};
 }
 
 std::optional<StereoMatch> StereoMatcher::follow(const ImagePyramid& right, const ReferencePatch& patch,
                                                  const Warp& left_warp, const Eigen::Vector2d& left,
-                                                 double inverse_depth, const Eigen::Matrix2f& right_from_left) const {
-  const auto pixel = project(left, inverse_depth);
-  if (!pixel) return std::nullopt;
-  const auto match = patch.align(right, {pixel->cast<float>(), right_from_left * left_warp.affine}, 0);
+                                                 const Facet& facet) const {
+  const auto start = carry_over(left_warp, left, facet, right_from_left_, left_lens_, right_lens_);
+  if (!start) return std::nullopt;
+  const auto match = patch.align(right, *start, 0);
   if (!match) return std::nullopt;
-  const auto accepted = accept(*match, left_warp, left);
+  const auto accepted = accept(*match, *start, left_warp, left, facet);
   if (!accepted) return std::nullopt;
-  const double jump = std::abs(accepted->inverse_depth - inverse_depth);
+  const double inverse_depth = facet.inverse_depth(left);
+  const double jump = std::abs(accepted->facet.inverse_depth(left) - inverse_depth);
   if (jump > kMaxDepthJumpPx * inverse_depth_per_pixel_ + kMaxDepthJumpShare * inverse_depth) return std::nullopt;
   return accepted;
 }
 
 std::optional<StereoMatch> StereoMatcher::search(const ImagePyramid& right, const ReferencePatch& patch,
                                                  const Warp& left_warp, const Eigen::Vector2d& left) const {
-  // The maps between the images hardly depend on depth; take it halfway.
-  const Eigen::Matrix2f map = predicted_map(left_warp.centre.cast<double>(), 0.25 * max_inverse_depth_);
-  const Eigen::Matrix2f affine = map * left_warp.affine;
+  // How a facet that faces the camera looks hardly depends on its depth; take it halfway.
+  const Facet facing = Facet::through(left, 0.25 * max_inverse_depth_);
+  const auto carried = carry_over(left_warp, left, facing, right_from_left_, left_lens_, right_lens_);
+  if (!carried) return std::nullopt;
+  const auto at = [&](const Eigen::Vector2d& pixel) {
+    Warp warp = *carried;
+    warp.centre = pixel.cast<float>();
+    return warp;
+  };
   const int level = std::min(kSearchLevel, right.top_level());
 
   std::vector<Hypothesis> line;
@@ -93,7 +94,7 @@ std::optional<StereoMatch> StereoMatcher::search(const ImagePyramid& right, cons
   for (double inverse_depth = 0.0; inverse_depth <= max_inverse_depth_; inverse_depth += step) {
     const auto pixel = project(left, inverse_depth);
     if (!pixel) continue;
-    const auto correlation = patch.correlate(right, {pixel->cast<float>(), affine}, level);
+    const auto correlation = patch.correlate(right, at(*pixel), level);
     if (correlation) line.push_back({inverse_depth, *pixel, *correlation});
   }
   std::vector<Hypothesis> peaks;
@@ -110,7 +111,7 @@ std::optional<StereoMatch> StereoMatcher::search(const ImagePyramid& right, cons
 
   std::optional<ReferencePatch::Match> best;
   for (const Hypothesis& peak : peaks) {
-    const auto match = patch.align(right, {peak.pixel.cast<float>(), affine}, kRefineLevel);
+    const auto match = patch.align(right, at(peak.pixel), kRefineLevel);
     if (!match) continue;
     if (!best) {
       best = match;
@@ -121,7 +122,7 @@ std::optional<StereoMatch> StereoMatcher::search(const ImagePyramid& right, cons
     if (match->correlation > best->correlation) best = match;
   }
   if (!best) return std::nullopt;
-  return accept(*best, left_warp, left);
+  return accept(*best, *carried, left_warp, left, facing);
 }
 
 }  // namespace ear

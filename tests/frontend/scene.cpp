@@ -173,4 +173,13 @@ TexturedRectangle wall(double distance, unsigned seed) {
   return rectangle;
 }
 
+TexturedRectangle floor_below(double height, unsigned seed) {
+  TexturedRectangle rectangle;
+  rectangle.metres_per_texel = 0.002;
+  rectangle.texture = random_texture(1000, 1500, seed);
+  rectangle.corner_W = {-1.0, height, 0.1};
+  rectangle.along_v_W = Eigen::Vector3d::UnitZ();
+  return rectangle;
+}
+
 }  // namespace ear

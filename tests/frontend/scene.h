@@ -58,4 +58,7 @@ MotionPrediction exact_motion(const Eigen::Isometry3d& T_WB0, const Eigen::Isome
 /// A wall facing the origin, `distance` [m] before it, four times as wide and 3.2 times as high as that.
 TexturedRectangle wall(double distance, unsigned seed);
 
+/// A floor `height` [m] below the origin's camera (y down, z forward), 2 m wide, from 0.1 m to 3.1 m before it.
+TexturedRectangle floor_below(double height, unsigned seed);
+
 }  // namespace ear

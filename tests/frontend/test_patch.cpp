@@ -20,6 +20,22 @@ cv::Mat warped(const cv::Mat& image, const Eigen::Matrix2f& affine, const Eigen:
   return out;
 }
 
+// The image in which what was at centre + o is at centre + o / (1 + perspective . o).
+cv::Mat foreshortened(const cv::Mat& image, const Eigen::Vector2f& centre, const Eigen::Vector2f& perspective) {
+  const auto shift = [&](float sign) {
+    Eigen::Matrix3f T = Eigen::Matrix3f::Identity();
+    T.topRightCorner<2, 1>() = sign * centre;
+    return T;
+  };
+  Eigen::Matrix3f P = Eigen::Matrix3f::Identity();
+  P.bottomLeftCorner<1, 2>() = perspective.transpose();
+  const Eigen::Matrix3f H = shift(1.0F) * P * shift(-1.0F);
+  const cv::Matx33f m(H(0, 0), H(0, 1), H(0, 2), H(1, 0), H(1, 1), H(1, 2), H(2, 0), H(2, 1), H(2, 2));
+  cv::Mat out;
+  cv::warpPerspective(image, out, m, image.size(), cv::INTER_LANCZOS4, cv::BORDER_REFLECT_101);
+  return out;
+}
+
 ImagePyramid pyramid_of(const cv::Mat& image) {
   ImagePyramid pyramid;
   pyramid.build(view_of(image));
@@ -114,6 +130,33 @@ TEST_CASE("patch: turn, stretch and shear are found along with the position") {
   REQUIRE(match);
   CHECK((match->warp.centre - to).norm() < 0.05F);
   CHECK((match->warp.affine - affine).norm() < 0.04F);
+}
+
+TEST_CASE("patch: a perspective that is known does not shift the position") {
+  const cv::Mat image = random_texture(320, 240, 8);
+  const ImagePyramid before = pyramid_of(image);
+  const Eigen::Vector2f perspective(0.001F, -0.006F);
+  const Eigen::Vector2f at(160.5F, 120.5F);
+  Eigen::Vector2f with = Eigen::Vector2f::Zero();
+  Eigen::Vector2f without = Eigen::Vector2f::Zero();
+  int count = 0;
+  for (const float u : {-90.0F, -45.0F, 0.0F, 45.0F, 90.0F}) {
+    for (const float v : {-60.0F, -30.0F, 0.0F, 30.0F, 60.0F}) {
+      const Eigen::Vector2f centre = at + Eigen::Vector2f(u, v);
+      const ImagePyramid after = pyramid_of(foreshortened(image, centre, perspective));
+      ReferencePatch patch;
+      if (!patch.capture(before, centre)) continue;
+      const auto known = patch.align(after, {centre, Eigen::Matrix2f::Identity(), perspective}, 0);
+      const auto unknown = patch.align(after, {centre}, 0);
+      if (!known || !unknown) continue;
+      with += known->warp.centre - centre;
+      without += unknown->warp.centre - centre;
+      ++count;
+    }
+  }
+  REQUIRE(count > 20);
+  CHECK(with.norm() / static_cast<float>(count) < 0.02F);
+  CHECK(without.y() / static_cast<float>(count) > 0.08F);  // mean square of the patch's offsets, times perspective
 }
 
 TEST_CASE("patch: what the patch does not show stays as it was known") {

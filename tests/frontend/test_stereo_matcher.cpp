@@ -1,5 +1,6 @@
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <opencv2/core.hpp>
 #include <random>
@@ -55,7 +56,7 @@ Result search_all(const Pair& pair) {
     const auto seen = right_lens.to_pixel((pair.cameras[1].T_BC.inverse() * *point).hnormalized());
     if (!seen || seen->x() < 8.0 || seen->y() < 8.0 || seen->x() > 311.0 || seen->y() > 231.0) continue;
     ++result.tried;
-    const auto match = matcher.search(pair.right, patch, {corner.pixel, Eigen::Matrix2f::Identity()}, *ray);
+    const auto match = matcher.search(pair.right, patch, {corner.pixel}, *ray);
     if (!match) continue;
     ++result.found;
     const double error = (*right_lens.to_pixel(match->right) - *seen).norm();
@@ -66,9 +67,10 @@ Result search_all(const Pair& pair) {
     }
     if (error < 0.5) {
       const double per_pixel = matcher.inverse_depth_per_pixel();
-      CHECK(std::abs(match->inverse_depth - 1.0 / point->z()) < per_pixel);
-      const auto again = matcher.follow(pair.right, patch, {corner.pixel, Eigen::Matrix2f::Identity()}, *ray,
-                                        match->inverse_depth + 0.5 * per_pixel, match->right_from_left);
+      const double inverse_depth = match->facet.inverse_depth(*ray);
+      CHECK(std::abs(inverse_depth - 1.0 / point->z()) < per_pixel);
+      const Facet shifted = Facet::through(*ray, inverse_depth + 0.5 * per_pixel, match->facet.gradient());
+      const auto again = matcher.follow(pair.right, patch, {corner.pixel}, *ray, shifted);
       if (again && (again->right - match->right).norm() < 0.1 / 200.0) ++result.followed;
     }
   }
@@ -93,16 +95,37 @@ TEST_CASE("stereo: points are found from near to far, with both lenses") {
 }
 
 TEST_CASE("stereo: on a floor that runs away from the camera") {
-  TexturedRectangle floor;
-  floor.metres_per_texel = 0.002;
-  floor.texture = random_texture(1000, 1000, 9);
-  floor.corner_W = {-1.0, 0.25, 0.1};
-  floor.along_v_W = Eigen::Vector3d::UnitZ();
-  const Result result = search_all(Pair({floor}));
+  const Result result = search_all(Pair({floor_below(0.25, 9)}));
   CHECK(result.tried > 30);
   CHECK(result.found > 0.7 * result.tried);
   CHECK(result.wrong <= 1);
   CHECK(result.error_px < 0.3);
+}
+
+TEST_CASE("stereo: what is followed tells how the surface leans") {
+  const double height = 0.25;
+  for (const bool on_floor : {true, false}) {
+    CAPTURE(on_floor);
+    const Pair pair({on_floor ? floor_below(height, 9) : wall(1.0, 9)});
+    const StereoMatcher matcher(pair.cameras[0], pair.cameras[1], kNearest);
+    const Lens lens(pair.cameras[0]);
+    std::vector<double> gradients;
+    for (const Corner& corner : Detector(320, 240, 100).detect(pair.left, {}, 100)) {
+      ReferencePatch patch;
+      const auto ray = lens.to_normalized(corner.pixel.cast<double>());
+      if (!ray || ray->y() < 0.2 || !patch.capture(pair.left, corner.pixel)) continue;
+      auto match = matcher.search(pair.right, patch, {corner.pixel}, *ray);
+      for (int frame = 0; match && frame < 3; ++frame) {
+        match = matcher.follow(pair.right, patch, {corner.pixel}, *ray, match->facet);
+      }
+      if (match) gradients.push_back(match->facet.gradient().y());
+    }
+    REQUIRE(gradients.size() > 20);
+    std::nth_element(gradients.begin(), gradients.begin() + static_cast<std::ptrdiff_t>(gradients.size() / 2),
+                     gradients.end());
+    const double truth = on_floor ? 1.0 / height : 0.0;
+    CHECK(std::abs(gradients[gradients.size() / 2] - truth) < 0.4);  // a tenth of the floor's
+  }
 }
 
 TEST_CASE("stereo: texture that repeats along the line is rather left out than guessed") {
@@ -138,9 +161,8 @@ TEST_CASE("stereo: what is followed must be where it was") {
   ReferencePatch patch;
   REQUIRE(patch.capture(pair.left, pixel));
   const Eigen::Vector2d ray = *Lens(pair.cameras[0]).to_normalized(pixel.cast<double>());
-  const Warp warp{pixel, Eigen::Matrix2f::Identity()};
-  CHECK(matcher.follow(pair.right, patch, warp, ray, 1.0, Eigen::Matrix2f::Identity()));
-  CHECK_FALSE(matcher.follow(pair.right, patch, warp, ray, 3.0, Eigen::Matrix2f::Identity()));
+  CHECK(matcher.follow(pair.right, patch, {pixel}, ray, Facet::through(ray, 1.0)));
+  CHECK_FALSE(matcher.follow(pair.right, patch, {pixel}, ray, Facet::through(ray, 3.0)));
 }
 
 TEST_CASE("stereo: two cameras in one place are refused") {
