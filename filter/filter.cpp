@@ -7,6 +7,7 @@
 #include <string>
 
 #include "filter/ground.h"
+#include "filter/rolling_start.h"
 
 namespace ear {
 namespace {
@@ -15,6 +16,9 @@ constexpr std::size_t kImuCapacity = 4096;   // 20 s at 200 Hz, 4 s at 1 kHz
 constexpr std::size_t kWheelCapacity = 512;  // readings that wait for the state to pass them
 constexpr double kSpinUp = 0.1;              // [s] after a touchdown until the wheels roll
 constexpr double kSlipEnds = 0.15;           // [s] of agreement before a row that failed its gate is used again
+constexpr double kRollingWindow = 2.0;       // [s] of samples kept for a start while rolling
+constexpr double kRollingStart = 1.5;        // [s] of them that it takes
+constexpr double kRollingVelocity = 0.5;     // [m/s] and share of the speed: before the samples of the window are used
 constexpr double kTooLate = 0.1;             // [s] behind the state: a reading that comes so late is not used
 constexpr double kWheelAge = 0.1;            // [s] older readings do not tell whether the wheels rest
 constexpr double kHeldSample = 0.02;         // [s] so far the newest IMU sample may stand in for one that is missing
@@ -170,12 +174,16 @@ void Filter::add_encoder(const EncoderSample& sample) {
   const std::optional<WheelTurn> turn = encoder_->add(sample);
   if (!turn) return;
   wheel_rest_.add(*turn);
-  if (status_ != Status::tracking) return;
-  if (seconds_between(turn->to_ns, state_.imu.t_ns) > kTooLate) {
-    ++counts_.encoder_rejected;
-    return;
+  if (status_ == Status::tracking) {
+    if (seconds_between(turn->to_ns, state_.imu.t_ns) > kTooLate) {
+      ++counts_.encoder_rejected;
+      return;
+    }
+    if (turns_.full()) advance_measuring(turns_.front().to_ns);  // no frames for long
+  } else {
+    const auto too_old = [&] { return seconds_between(turns_.front().from_ns, turn->to_ns) > kRollingWindow; };
+    while (!turns_.empty() && (turns_.full() || too_old())) turns_.pop();
   }
-  if (turns_.full()) advance_measuring(turns_.front().to_ns);  // no frames for long
   turns_.push(*turn);
 }
 
@@ -188,8 +196,12 @@ void Filter::add_laser(const LaserSample& sample) {
   }
   last_range_ns_ = sample.t_ns;
   note_contact(contact_.add_laser(sample));
-  if (status_ != Status::tracking) return;
-  if (ranges_.full()) advance_measuring(ranges_.front().t_ns);
+  if (status_ == Status::tracking) {
+    if (ranges_.full()) advance_measuring(ranges_.front().t_ns);
+  } else {
+    const auto too_old = [&] { return seconds_between(ranges_.front().t_ns, sample.t_ns) > kRollingWindow; };
+    while (!ranges_.empty() && (ranges_.full() || too_old())) ranges_.pop();
+  }
   BeamRanges reading;
   reading.t_ns = sample.t_ns;
   std::copy(sample.range.begin(), sample.range.end(), reading.range.begin());
@@ -271,7 +283,7 @@ bool Filter::begin_frame(const FeatureFrame& frame) {
                                         on_ground() ? wheel_rest_.duration(t_ns, kWheelAge) : std::nullopt);
   contact_.set_gyro_bias(state_.imu.b_g);
   statistics_.on_ground = on_ground();
-  if (started || try_start(t_ns, imu, still)) advance_measuring(t_ns);
+  if (started || try_start(t_ns, imu, still) || try_rolling_start()) advance_measuring(t_ns);
   return still;
 }
 
@@ -290,6 +302,8 @@ bool Filter::try_start(TimeNs t_ns, const ImuStatistics& imu, bool still) {
 
   covariance_.reset(start_sigma());
   status_ = Status::tracking;
+  turns_.clear();  // all before t_ns
+  ranges_.clear();
 
   // force = R^T (-g) + b_a + n, rate = b_g + n; with the invariant error, R^T u = R^^T (u + [u]x theta).
   const double root_duration = std::sqrt(imu.duration);
@@ -303,6 +317,20 @@ bool Filter::try_start(TimeNs t_ns, const ImuStatistics& imu, bool still) {
   H.block<3, 3>(3, err::b_g) = Eigen::Matrix3d::Identity() / gyro_sigma;
   r.tail<3>() = (imu.gyro_mean - x.b_g) / gyro_sigma;
   update(H, 0, r);
+  return true;
+}
+
+/// Rolling: begin where the window of samples begins, near what explains them, and take them in from there.
+bool Filter::try_rolling_start() {
+  if (!on_ground()) return false;
+  const RollingStartNoise noise{config_.prior.gyro_bias, config_.prior.accel_bias};
+  const std::optional<ImuState> start = rolling_start(imu_, turns_, state_.odometer, noise, kRollingStart);
+  if (!start) return false;
+  state_.imu = *start;
+  Eigen::VectorXd sigma = start_sigma();
+  sigma.segment<3>(err::nu).setConstant(kRollingVelocity * (1.0 + start->v_W.norm()));
+  covariance_.reset(sigma);
+  status_ = Status::tracking;
   return true;
 }
 

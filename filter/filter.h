@@ -84,6 +84,7 @@ class Filter {
 
   [[nodiscard]] TimeNs imu_time(TimeNs camera_time_ns) const;
   bool try_start(TimeNs t_ns, const ImuStatistics& imu, bool still);
+  bool try_rolling_start();
   [[nodiscard]] Eigen::VectorXd start_sigma() const;
   bool begin_frame(const FeatureFrame& frame);
   void advance(TimeNs t_ns);

@@ -16,12 +16,17 @@ class Ring {
   [[nodiscard]] bool full() const { return size_ == items_.size(); }
   [[nodiscard]] std::size_t size() const { return size_; }
   [[nodiscard]] const T& front() const { return items_[first_]; }
+  [[nodiscard]] const T& back() const { return (*this)[size_ - 1]; }
+  /// Oldest first.
+  [[nodiscard]] const T& operator[](std::size_t i) const { return items_[(first_ + i) % items_.size()]; }
 
   /// Appends; it must not be full.
   void push(const T& item) {
     assert(!full());
     items_[(first_ + size_++) % items_.size()] = item;
   }
+
+  void clear() { size_ = 0; }
 
   void pop() {
     assert(!empty());

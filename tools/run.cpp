@@ -121,6 +121,13 @@ RunSummary summarize(const RunArguments& args, const Recording& recording, const
   summary.stage_times_s = {{"pyramid", t.pyramid}, {"track", t.track},   {"detect", t.detect},
                            {"stereo", t.stereo},   {"reject", t.reject}, {"filter", t.filter}};
   summary.warnings = recording.warnings();
+  const Calibration learned = odometry.calibration();
+  if (!learned.cameras.empty()) summary.calibration.emplace_back("camera_time_offset", learned.camera_time_offset);
+  if (learned.encoder) {
+    summary.calibration.emplace_back("wheel_radius_left", learned.encoder->wheel_radius[0]);
+    summary.calibration.emplace_back("wheel_radius_right", learned.encoder->wheel_radius[1]);
+    summary.calibration.emplace_back("wheel_separation", learned.encoder->wheel_separation);
+  }
   return summary;
 }
 

@@ -135,6 +135,8 @@ void write_summary(const RunSummary& summary, const std::filesystem::path& file)
   for (const auto& [name, count] : summary.counts) json["counts"][name] = count;
   json["stage_times_s"] = nlohmann::ordered_json::object();
   for (const auto& [name, seconds] : summary.stage_times_s) json["stage_times_s"][name] = seconds;
+  json["calibration"] = nlohmann::ordered_json::object();
+  for (const auto& [name, value] : summary.calibration) json["calibration"][name] = value;
   json["warnings"] = to_json(summary.warnings);
   OutputFile(file).write(json.dump(2) + "\n");
 }

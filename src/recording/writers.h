@@ -55,6 +55,7 @@ struct RunSummary {
   double duration_s = 0.0;                                    ///< length of the recording [s]
   double wall_time_s = 0.0;                                   ///< time that the run took [s]
   std::vector<std::pair<std::string, double>> stage_times_s;  ///< whole run, per stage [s]
+  std::vector<std::pair<std::string, double>> calibration;    ///< what was learned while running, SI units
   std::vector<Warning> warnings;
 };
 

@@ -5,6 +5,8 @@
 #include <cmath>
 
 #include "tests/support/simulated_run.h"
+#include "tools/evaluation/alignment.h"
+#include "tools/experiments/sample_feed.h"
 
 using namespace ear;
 
@@ -103,4 +105,50 @@ TEST_CASE("wheels and lasers: no odometer in the air, and again after the landin
   const Errors with = run(simulation, OdometerModel::terrain);
   CHECK(with.mode > 0.95);
   CHECK(with.position < 0.05);
+}
+
+TEST_CASE("wheels and lasers: a recording that begins in motion starts rolling, within two seconds") {
+  for (const char* sequence : {"flat1", "wave1"}) {
+    CAPTURE(sequence);
+    const simulator::Simulation simulation = simulate(sequence, 817, 40.0);
+    const TimeNs first_ns = simulation.imu().front().t_ns + 8'000'000'000;
+    struct LateReceiver {
+      Filter& filter;
+      TimeNs first_ns;
+      void add_imu(const ImuSample& sample) {
+        if (sample.t_ns >= first_ns) filter.add_imu(sample);
+      }
+      void add_encoder(const EncoderSample& sample) {
+        if (sample.t_ns >= first_ns) filter.add_encoder(sample);
+      }
+      void add_laser(const LaserSample& sample) {
+        if (sample.t_ns >= first_ns) filter.add_laser(sample);
+      }
+    };
+    Filter filter(FilterConfig{}, simulation.calibration());
+    LateReceiver receiver{filter, first_ns};
+    experiments::SampleFeed feed(simulation);
+    evaluation::Trajectory estimated;
+    evaluation::Trajectory truth;
+    for (std::size_t i = 0; i < simulation.frame_times().size(); ++i) {
+      const TimeNs t_ns = simulation.frame_times()[i];
+      feed.until_frame(t_ns, receiver);
+      if (t_ns < first_ns) continue;
+      const auto estimate = filter.process(simulation.tracks(i));
+      if (!estimate) {
+        REQUIRE(t_ns < first_ns + 2'000'000'000);
+        continue;
+      }
+      const NavState& x = estimate->state;
+      const simulator::Truth at = simulation.truth(x.t_ns);
+      estimated.push_back({x.t_ns, x.q_WB, x.p_WB});
+      truth.push_back({x.t_ns, Eigen::Quaterniond(at.R_WB), at.p_WB});
+    }
+    const evaluation::Alignment alignment = evaluation::align(evaluation::AlignmentKind::yaw, estimated, truth);
+    double worst = 0.0;
+    for (std::size_t i = 0; i < truth.size(); ++i) {
+      worst = std::max(worst, (alignment.T_TE * estimated[i].p_WB - truth[i].p_WB).norm());
+    }
+    CHECK(worst < 0.15);  // of 28 m, the first moments included
+  }
 }

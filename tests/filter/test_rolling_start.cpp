@@ -1,0 +1,90 @@
+#include "filter/rolling_start.h"
+
+#include <doctest/doctest.h>
+
+#include <cmath>
+
+#include "tools/simulator/simulation.h"
+
+using namespace ear;
+
+namespace {
+
+/// Two seconds of a simulated drive, from `from` seconds on.
+struct Window {
+  ImuBuffer imu{4096};
+  Ring<WheelTurn> turns{512};
+  OdometerState odometer;
+  TimeNs start_ns = 0;
+
+  Window(const simulator::Simulation& simulation, double from) {
+    const TimeNs begin_ns = simulation.imu().front().t_ns + static_cast<TimeNs>(1e9 * from);
+    const TimeNs end_ns = begin_ns + 2'000'000'000;
+    for (const ImuSample& sample : simulation.imu()) {
+      if (sample.t_ns >= begin_ns - 20'000'000 && sample.t_ns <= end_ns) imu.push(sample);
+    }
+    const EncoderCalibration& axle = *simulation.calibration().encoder;
+    EncoderReader reader(axle);
+    for (const EncoderSample& sample : simulation.encoders()) {
+      const auto turn = reader.add(sample);
+      if (turn && turn->from_ns >= begin_ns && turn->to_ns <= end_ns) turns.push(*turn);
+    }
+    odometer.wheel_radius << axle.wheel_radius[0], axle.wheel_radius[1];
+    odometer.T_BO = {axle.T_BO.linear(), axle.T_BO.translation()};
+    start_ns = turns.front().from_ns;
+  }
+};
+
+simulator::Simulation drive(const char* sequence, std::uint64_t seed) {
+  simulator::Options options;
+  options.sequence = sequence;
+  options.seed = seed;
+  options.duration = 30.0;
+  options.tracks = false;
+  return simulator::Simulation(options);
+}
+
+}  // namespace
+
+TEST_CASE("rolling start: tilt, speed and direction of a vehicle that drives") {
+  for (const char* sequence : {"flat1", "wave1", "slope"}) {
+    CAPTURE(sequence);
+    for (const double from : {7.0, 13.0, 19.0}) {
+      CAPTURE(from);
+      const simulator::Simulation simulation = drive(sequence, 821);
+      const Window window(simulation, from);
+      const auto state = rolling_start(window.imu, window.turns, window.odometer, RollingStartNoise{}, 1.5);
+      REQUIRE(state);
+      CHECK(state->t_ns == window.start_ns);
+      const simulator::Truth truth = simulation.truth(state->t_ns);
+      const Eigen::Vector3d up_B = state->R_WB.transpose() * Eigen::Vector3d::UnitZ();
+      const Eigen::Vector3d true_up_B = truth.R_WB.transpose() * Eigen::Vector3d::UnitZ();
+      CHECK(std::acos(std::min(1.0, up_B.dot(true_up_B))) < 0.1);  // a point to linearize at
+      const Eigen::Vector3d v_B = state->R_WB.transpose() * state->v_W;
+      CHECK((v_B - truth.R_WB.transpose() * truth.v_W).norm() < 0.5);  // the body leans against the hill
+    }
+  }
+}
+
+TEST_CASE("rolling start: not in the air, not with holes, not from too little") {
+  const simulator::Simulation simulation = drive("flat1", 822);
+  const Window window(simulation, 8.0);
+  const RollingStartNoise noise;
+  CHECK_FALSE(rolling_start(window.imu, window.turns, window.odometer, noise, 2.5));
+  CHECK_FALSE(rolling_start(ImuBuffer(8), window.turns, window.odometer, noise, 1.5));
+  CHECK_FALSE(rolling_start(window.imu, Ring<WheelTurn>(8), window.odometer, noise, 1.5));
+
+  Ring<WheelTurn> with_hole(512);
+  for (std::size_t i = 0; i < window.turns.size(); ++i) {
+    if (i != 50) with_hole.push(window.turns[i]);
+  }
+  CHECK_FALSE(rolling_start(window.imu, with_hole, window.odometer, noise, 1.5));
+
+  Ring<WheelTurn> contradicting(512);  // wheels that race, at accelerations that the accelerometer does not see
+  for (std::size_t i = 0; i < window.turns.size(); ++i) {
+    WheelTurn turn = window.turns[i];
+    turn.angle *= 1.0 + 2.0 * std::sin(0.3 * static_cast<double>(i));
+    contradicting.push(turn);
+  }
+  CHECK_FALSE(rolling_start(window.imu, contradicting, window.odometer, noise, 1.5));
+}
