@@ -16,6 +16,7 @@ LAYERS = {
     "frontend/": ["frontend/", "include/ear/", "eigen", "opencv", *STANDARD],
     "src/": ["src/", "filter/", "frontend/", "include/ear/", "eigen", "opencv", "spdlog", *STANDARD],
     "src/recording/": ["src/recording/", "include/ear/", "eigen", "opencv", "yaml-cpp", "json", "spdlog", *STANDARD],
+    "src/mavlink/": ["src/mavlink/", "filter/", "include/ear/", "eigen", "posix", *STANDARD],
     # Simulated truth shares no code with the models, and an evaluation does not know what made the estimate.
     "tools/simulator/": ["tools/simulator/", "include/ear/", "eigen", "opencv", *STANDARD],
     "tools/evaluation/": ["tools/evaluation/", "include/ear/", "eigen", "json", *STANDARD],

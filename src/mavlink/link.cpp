@@ -1,0 +1,74 @@
+#include "src/mavlink/link.h"
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+namespace ear::mavlink {
+namespace {
+
+using SteadyClock = std::chrono::steady_clock;
+constexpr std::chrono::milliseconds kHeartbeatInterval{1000};
+constexpr int kPatienceMs = 50;  // how long the thread waits for bytes before it looks at the time
+
+}  // namespace
+
+std::optional<TimeSync> answer_to(const Packet& packet, const Sender& self, TimeNs now_ns) {
+  const std::optional<TimeSync> request = to_time_sync(packet.payload);
+  if (!request || request->tc1 != 0) return std::nullopt;  // not a request, but somebody's answer
+  const bool for_us = (request->target_system == 0 || request->target_system == self.system) &&
+                      (request->target_component == 0 || request->target_component == self.component);
+  if (!for_us) return std::nullopt;
+  return TimeSync{std::max<TimeNs>(now_ns, 1), request->ts1, packet.sender.system, packet.sender.component};
+}
+
+Link::Link(const std::string& address, const Sender& sender, std::function<TimeNs()> clock)
+    : transport_(address), sender_(sender), clock_(std::move(clock)), thread_([this] { converse(); }) {}
+
+Link::~Link() {
+  stop_ = true;
+  thread_.join();
+}
+
+void Link::send(const OdometryMessage& message) {
+  if (!send(to_payload(message))) return;
+  const std::lock_guard lock(mutex_);
+  ++counts_.odometry;
+}
+
+void Link::send(const StatusText& message) { send(to_payload(message)); }
+
+LinkCounts Link::counts() const {
+  const std::lock_guard lock(mutex_);
+  return counts_;
+}
+
+bool Link::send(const Payload& payload) {
+  const std::lock_guard lock(mutex_);  // packets of two threads must not mix
+  const bool sent = transport_.send(to_bytes({sender_, sequence_++, payload}));
+  if (!sent) ++counts_.dropped;
+  return sent;
+}
+
+void Link::answer(const Packet& request) {
+  const std::optional<TimeSync> reply = answer_to(request, sender_, clock_());
+  if (!reply || !send(to_payload(*reply))) return;
+  const std::lock_guard lock(mutex_);
+  ++counts_.time_answers;
+}
+
+void Link::converse() {
+  Parser parser;
+  std::array<std::uint8_t, 1024> bytes{};
+  SteadyClock::time_point next_heartbeat = SteadyClock::now();
+  while (!stop_) {
+    if (SteadyClock::now() >= next_heartbeat) {
+      send(to_payload(Heartbeat{state_}));
+      next_heartbeat += kHeartbeatInterval;
+    }
+    const std::size_t count = transport_.receive(bytes.data(), bytes.size(), kPatienceMs);
+    for (const Packet& packet : parser.add(bytes.data(), count)) answer(packet);
+  }
+}
+
+}  // namespace ear::mavlink

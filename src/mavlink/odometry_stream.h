@@ -1,0 +1,64 @@
+// What to tell the flight controller, and when: ODOMETRY at 30 to 50 Hz while the estimate can be used, nothing while
+// it cannot, and a line of text when that changes. It sends nothing itself and has no clock: time comes with the data.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <optional>
+
+#include "ear/calibration.h"
+#include "ear/odometry.h"
+#include "src/mavlink/messages.h"
+#include "src/mavlink/odometry_message.h"
+
+namespace ear::mavlink {
+
+/// What the pilot is told of.
+enum class Health : std::uint8_t {
+  starting,  ///< no estimate yet
+  good,
+  weak,  ///< few features: the estimate drifts sooner
+  lost   ///< there was an estimate, and there is none
+};
+
+[[nodiscard]] StatusText to_text(Health health);
+[[nodiscard]] SystemState to_system_state(Health health);
+
+/// 1 ... 100: two for each feature that the cameras track; 100 for a vehicle that is known to stand.
+[[nodiscard]] int quality_of(const FrameStatistics& frame);
+
+class OdometryStream {
+ public:
+  /// R_BV: vehicle (x forward, y right, z down) to body; see mounting_of().
+  OdometryStream(const Eigen::Matrix3d& R_BV, const ImuCalibration& imu);
+
+  /// Every inertial sample, in time order: the angular rate comes from these.
+  void add_imu(const ImuSample& sample);
+
+  /// The outcome of one frame. The message to send, if any.
+  [[nodiscard]] std::optional<OdometryMessage> add_frame(const std::optional<Estimate>& estimate, Status status);
+
+  /// Where frames come at less than 30 Hz, predicted states fill the gaps: is one due at `t_ns`?
+  [[nodiscard]] bool wants_prediction(TimeNs t_ns) const;
+  [[nodiscard]] OdometryMessage add_prediction(const NavState& state);
+
+  [[nodiscard]] Health health() const { return health_; }
+
+ private:
+  [[nodiscard]] Health health_after(const std::optional<Estimate>& estimate, Status status) const;
+  [[nodiscard]] OdometryMessage make_message(const NavState& state);
+  [[nodiscard]] Eigen::Vector3d rate_B(const NavState& state) const;
+
+  Eigen::Matrix3d R_BV_;
+  double rate_variance_;                             ///< of one gyroscope sample [rad^2/s^2]
+  std::array<std::optional<ImuSample>, 2> samples_;  ///< the last two, older first
+  Health health_ = Health::starting;
+  std::uint8_t reset_counter_ = 0;
+
+  std::optional<Estimate> last_;          ///< the last estimate
+  std::optional<double> frame_interval_;  ///< [s] between the last two estimates
+  TimeNs last_sent_ns_ = 0;
+};
+
+}  // namespace ear::mavlink
