@@ -8,15 +8,18 @@ constexpr TimeNs kPatience = 150'000'000;  // so long after the last image the n
 
 class Replay {
  public:
-  Replay(Recording& recording, Odometry& odometry, const std::function<void(const ReplayedFrame&)>& on_frame)
+  Replay(Recording& recording, Odometry& odometry, const std::function<void(const ReplayedFrame&)>& on_frame,
+         const std::function<void(const Sample&)>& before_sample)
       : recording_(recording),
         odometry_(odometry),
         on_frame_(on_frame),
+        before_sample_(before_sample),
         camera_offset_ns_(static_cast<TimeNs>(1e9 * recording.calibration().camera_time_offset)),
         has_camera_(!recording.calibration().cameras.empty()) {}
 
   void run() {
     while (const std::optional<Sample> sample = recording_.next()) {
+      if (before_sample_) before_sample_(*sample);
       std::visit([this](const auto& s) { take(s); }, *sample);
     }
     hand_over();
@@ -53,6 +56,7 @@ class Replay {
   Recording& recording_;
   Odometry& odometry_;
   const std::function<void(const ReplayedFrame&)>& on_frame_;
+  const std::function<void(const Sample&)>& before_sample_;
   TimeNs camera_offset_ns_;
   bool has_camera_;
   std::unique_ptr<RecordedFrame> waiting_;
@@ -62,8 +66,9 @@ class Replay {
 
 }  // namespace
 
-void replay(Recording& recording, Odometry& odometry, const std::function<void(const ReplayedFrame&)>& on_frame) {
-  Replay(recording, odometry, on_frame).run();
+void replay(Recording& recording, Odometry& odometry, const std::function<void(const ReplayedFrame&)>& on_frame,
+            const std::function<void(const Sample&)>& before_sample) {
+  Replay(recording, odometry, on_frame, before_sample).run();
 }
 
 }  // namespace ear::tools

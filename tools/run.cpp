@@ -16,6 +16,7 @@
 #include "src/recording/recording.h"
 #include "src/recording/writers.h"
 #include "tools/commands.h"
+#include "tools/flight_controller.h"
 #include "tools/progress.h"
 #include "tools/replay.h"
 
@@ -30,6 +31,7 @@ struct RunArguments {
   double camera_rate_hz = 0.0;
   bool mono = false;
   std::optional<OdometerModel> odometer;
+  FlightControllerArguments flight_controller;
 };
 
 /// What happened over the whole run.
@@ -147,26 +149,37 @@ void run(const RunArguments& args) {
   StatesWriter states(args.out / "states.csv");
   save_config(config, args.out / "config.yaml");
 
+  std::optional<FlightController> flight_controller;
+  if (!args.flight_controller.address.empty()) {
+    flight_controller.emplace(args.flight_controller, recording.calibration(), recording.span().first_ns);
+  }
+  const auto before_sample = [&](const Sample& sample) {
+    if (flight_controller) flight_controller->before_sample(sample, odometry);
+  };
+
   Totals totals;
   Progress progress;
   const auto start = std::chrono::steady_clock::now();
   const auto wall_time = [&] {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   };
-  replay(recording, odometry, [&](const ReplayedFrame& frame) {
+  const auto on_frame = [&](const ReplayedFrame& frame) {
+    if (flight_controller) flight_controller->after_frame(frame, odometry);
     totals.add(frame, odometry.stage_times());
     if (frame.estimate) {
       trajectory.write(*frame.estimate);
       states.write(*frame.estimate);
     }
     progress.show(progress_line(frame, odometry, recording.span(), wall_time()));
-  });
+  };
+  replay(recording, odometry, on_frame, before_sample);
   progress.finish();
   write_summary(summarize(args, recording, odometry, totals, wall_time()), args.out / "summary.json");
 
   std::printf("%llu of %llu frames estimated, %.1f s of recording in %.1f s: %s\n",
               static_cast<unsigned long long>(totals.estimates), static_cast<unsigned long long>(totals.frames),
               seconds_between(recording.span().first_ns, recording.span().last_ns), wall_time(), args.out.c_str());
+  if (flight_controller) std::printf("%s\n", flight_controller->report().c_str());
   for (const Warning& warning : recording.warnings()) {
     std::fprintf(stderr, "ear: warning: %s, %llu times, first at %s\n", warning.kind.c_str(),
                  static_cast<unsigned long long>(warning.count), warning.first.c_str());
@@ -197,6 +210,7 @@ void add_run_command(CLI::App& app) {
   for (const auto& [name, model] : names_of(OdometerModel{})) models.emplace(name, model);
   command->add_option("--odometer", args->odometer, "What is made of the wheels: none, differential, gyro or terrain")
       ->transform(CLI::CheckedTransformer(models));
+  add_options(*command, args->flight_controller);
   command->callback([args] { run(*args); });
 }
 

@@ -2,15 +2,18 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 namespace ear::mavlink {
 namespace {
 
 constexpr double kMinRate = 30.0;            // [Hz] below, PX4's EKF2 may not use the messages
 constexpr double kMinInterval = 0.9 / 50.0;  // [s] 50 Hz, and a tenth for jitter
-constexpr double kMaxPrediction =
-    0.25;  // [s] after a frame; with no frame since, the estimate is not vision's any more
+constexpr double kMaxUnsupported =
+    0.25;                            // [s] after a frame; with no frame since, the estimate is not vision's any more
+constexpr double kMaxLatency = 0.5;  // [s] from an exposure to its estimate
 constexpr int kQualityPerFeature = 2;
+constexpr int kWheelQuality = 40;
 constexpr int kWeakQuality = 20;
 constexpr int kGoodQuality = 30;  // hysteresis: a weak estimate is good again from here on
 
@@ -48,25 +51,30 @@ SystemState to_system_state(Health health) {
   return SystemState::critical;
 }
 
+bool is_supported(const FrameStatistics& frame) {
+  return frame.tracks > 0 || frame.standing || (frame.on_ground && frame.wheel_rows_used > 0);
+}
+
 int quality_of(const FrameStatistics& frame) {
-  return frame.standing ? 100 : std::clamp(kQualityPerFeature * frame.tracks, 1, 100);
+  if (frame.standing) return 100;
+  const bool wheels = frame.on_ground && frame.wheel_rows_used > 0;
+  return std::clamp(kQualityPerFeature * frame.tracks, wheels ? kWheelQuality : 1, 100);
 }
 
 OdometryStream::OdometryStream(const Eigen::Matrix3d& R_BV, const ImuCalibration& imu)
     : R_BV_(R_BV), rate_variance_(imu.gyro_noise * imu.gyro_noise * imu.rate_hz) {}
 
 void OdometryStream::add_imu(const ImuSample& sample) {
-  samples_[0] = samples_[1];
-  samples_[1] = sample;
+  samples_.push_back(sample);
+  while (seconds_between(samples_.front().t_ns, sample.t_ns) > kMaxLatency) samples_.pop_front();
 }
 
 std::optional<OdometryMessage> OdometryStream::add_frame(const std::optional<Estimate>& estimate, Status status) {
+  if (estimate && is_supported(estimate->frame)) last_supported_ns_ = estimate->state.t_ns;
   const Health before = health_;
   health_ = health_after(estimate, status);
-  if (!estimate) {
-    if (status != Status::tracking) last_.reset();
-    return std::nullopt;
-  }
+  if (health_ == Health::lost) last_.reset();
+  if (!estimate || health_ == Health::lost) return std::nullopt;
   if (before == Health::lost) ++reset_counter_;
 
   frame_interval_.reset();
@@ -82,7 +90,7 @@ bool OdometryStream::wants_prediction(TimeNs t_ns) const {
   const double step = *frame_interval_ / messages_per_frame(*frame_interval_);
   const double since_frame = seconds_between(last_->state.t_ns, t_ns);
   return seconds_between(last_sent_ns_, t_ns) >= step &&
-         since_frame < std::min(*frame_interval_ - 0.5 * step, kMaxPrediction);
+         since_frame < std::min(*frame_interval_ - 0.5 * step, kMaxUnsupported);
 }
 
 OdometryMessage OdometryStream::add_prediction(const NavState& state) { return make_message(state); }
@@ -92,12 +100,13 @@ Health OdometryStream::health_after(const std::optional<Estimate>& estimate, Sta
     // One frame that could not be used, or an estimator that gave up?
     return status == Status::tracking || health_ == Health::starting ? health_ : Health::lost;
   }
+  if (seconds_between(last_supported_ns_, estimate->state.t_ns) > kMaxUnsupported) return Health::lost;
   const int quality = quality_of(estimate->frame);
   return quality < (health_ == Health::weak ? kGoodQuality : kWeakQuality) ? Health::weak : Health::good;
 }
 
 OdometryMessage OdometryStream::make_message(const NavState& state) {
-  OdometryMessage message = make_odometry(state, rate_B(state), R_BV_);
+  OdometryMessage message = make_odometry(state, rate_B_at(state), R_BV_);
   set_covariances(message, state, last_->covariance, rate_variance_, R_BV_);
   message.reset_counter = reset_counter_;
   message.quality = static_cast<std::int8_t>(quality_of(last_->frame));
@@ -105,12 +114,15 @@ OdometryMessage OdometryStream::make_message(const NavState& state) {
   return message;
 }
 
-Eigen::Vector3d OdometryStream::rate_B(const NavState& state) const {
-  if (!samples_[1]) return Eigen::Vector3d::Zero();
-  if (!samples_[0]) return samples_[1]->gyro_B - state.b_g;
-  const double whole = seconds_between(samples_[0]->t_ns, samples_[1]->t_ns);
-  const double part = std::clamp(seconds_between(samples_[0]->t_ns, state.t_ns) / whole, 0.0, 1.0);
-  return (1.0 - part) * samples_[0]->gyro_B + part * samples_[1]->gyro_B - state.b_g;
+Eigen::Vector3d OdometryStream::rate_B_at(const NavState& state) const {
+  if (samples_.empty()) return Eigen::Vector3d::Zero();
+  const auto later = std::lower_bound(samples_.begin(), samples_.end(), state.t_ns,
+                                      [](const ImuSample& sample, TimeNs t_ns) { return sample.t_ns < t_ns; });
+  if (later == samples_.begin()) return later->gyro_B - state.b_g;
+  if (later == samples_.end()) return samples_.back().gyro_B - state.b_g;
+  const auto earlier = std::prev(later);
+  const double part = seconds_between(earlier->t_ns, state.t_ns) / seconds_between(earlier->t_ns, later->t_ns);
+  return (1.0 - part) * earlier->gyro_B + part * later->gyro_B - state.b_g;
 }
 
 }  // namespace ear::mavlink

@@ -3,8 +3,8 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 #include <cstdint>
+#include <deque>
 #include <optional>
 
 #include "ear/calibration.h"
@@ -19,13 +19,17 @@ enum class Health : std::uint8_t {
   starting,  ///< no estimate yet
   good,
   weak,  ///< few features: the estimate drifts sooner
-  lost   ///< there was an estimate, and there is none
+  lost   ///< there was an estimate, and there is none, or inertia alone carries it on
 };
 
 [[nodiscard]] StatusText to_text(Health health);
 [[nodiscard]] SystemState to_system_state(Health health);
 
-/// 1 ... 100: two for each feature that the cameras track; 100 for a vehicle that is known to stand.
+/// Does anything but inertia hold the estimate: features, wheels on the ground, standing?
+[[nodiscard]] bool is_supported(const FrameStatistics& frame);
+
+/// 1 ... 100: two for each feature that the cameras track, at least 40 where wheels carry on; 100 for a vehicle that is
+/// known to stand.
 [[nodiscard]] int quality_of(const FrameStatistics& frame);
 
 class OdometryStream {
@@ -48,16 +52,17 @@ class OdometryStream {
  private:
   [[nodiscard]] Health health_after(const std::optional<Estimate>& estimate, Status status) const;
   [[nodiscard]] OdometryMessage make_message(const NavState& state);
-  [[nodiscard]] Eigen::Vector3d rate_B(const NavState& state) const;
+  [[nodiscard]] Eigen::Vector3d rate_B_at(const NavState& state) const;
 
   Eigen::Matrix3d R_BV_;
-  double rate_variance_;                             ///< of one gyroscope sample [rad^2/s^2]
-  std::array<std::optional<ImuSample>, 2> samples_;  ///< the last two, older first
+  double rate_variance_;           ///< of one gyroscope sample [rad^2/s^2]
+  std::deque<ImuSample> samples_;  ///< the newest, oldest first: an exposure is older than they are
   Health health_ = Health::starting;
   std::uint8_t reset_counter_ = 0;
 
   std::optional<Estimate> last_;          ///< the last estimate
   std::optional<double> frame_interval_;  ///< [s] between the last two estimates
+  TimeNs last_supported_ns_ = 0;
   TimeNs last_sent_ns_ = 0;
 };
 

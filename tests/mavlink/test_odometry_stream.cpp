@@ -70,6 +70,7 @@ TEST_CASE("mavlink stream: the angular rate is the gyroscope's at the stamp, wit
   stream.add_imu({at(0.9), {9.0, 9.0, 9.0}});
   stream.add_imu({at(1.0), {0.0, 0.0, 1.0}});
   stream.add_imu({at(1.1), {0.0, 0.0, 2.0}});
+  stream.add_imu({at(1.2), {9.0, 9.0, 9.0}});  // the image took a while to arrive
   Estimate estimate = estimate_at(1.025);
   estimate.state.b_g = {0.0, 0.0, 0.25};
   const auto message = stream.add_frame(estimate, Status::tracking);
@@ -124,6 +125,26 @@ TEST_CASE("mavlink stream: without frames, predictions end") {
   CHECK_FALSE(stream.wants_prediction(at(3.3)));
 }
 
+TEST_CASE("mavlink stream: what inertia alone carries on is lost after a quarter of a second, with wheels it is not") {
+  for (const bool wheels : {false, true}) {
+    CAPTURE(wheels);
+    OdometryStream stream = make_stream();
+    CHECK(stream.add_frame(estimate_at(0.0), Status::tracking));
+    for (int i = 1; i <= 20; ++i) {
+      Estimate blind = estimate_at(0.05 * i, 0);
+      blind.frame.on_ground = wheels;
+      blind.frame.wheel_rows_used = wheels ? 10 : 0;
+      const bool expected = wheels || i <= 5;
+      CHECK(stream.add_frame(blind, Status::tracking).has_value() == expected);
+      CHECK((stream.health() == Health::lost) == !expected);
+      if (!expected) CHECK_FALSE(stream.wants_prediction(at(0.05 * i + 0.025)));
+    }
+    const auto next = stream.add_frame(estimate_at(1.05), Status::tracking);
+    REQUIRE(next);
+    CHECK(next->reset_counter == (wheels ? 0 : 1));  // it may have jumped
+  }
+}
+
 TEST_CASE("mavlink stream: quality and health follow the number of features, with hysteresis") {
   OdometryStream stream = make_stream();
   const auto after = [&](double t, int tracks) {
@@ -141,6 +162,11 @@ TEST_CASE("mavlink stream: quality and health follow the number of features, wit
   CHECK(after(0.4, 0) == 1);
   CHECK(after(0.5, 20) == 40);
   CHECK(stream.health() == Health::good);
+
+  Estimate on_wheels = estimate_at(0.55, 3);
+  on_wheels.frame.on_ground = true;
+  on_wheels.frame.wheel_rows_used = 15;
+  CHECK(stream.add_frame(on_wheels, Status::tracking)->quality == 40);
 
   Estimate standing = estimate_at(0.6, 0);
   standing.frame.standing = true;  // in the dark, on its wheels

@@ -1,0 +1,54 @@
+// A replay that tells a flight controller, in real time, what the estimator finds (docs/mavlink.md).
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "ear/odometry.h"
+#include "src/mavlink/link.h"
+#include "src/mavlink/odometry_stream.h"
+#include "src/recording/recording.h"
+#include "tools/real_time.h"
+#include "tools/replay.h"
+
+namespace CLI {
+class App;
+}
+
+namespace ear::tools {
+
+struct FlightControllerArguments {
+  std::string address;  ///< see mavlink::Transport; empty: no flight controller
+  std::vector<double>
+      mounting_deg;  ///< roll, pitch, yaw of the IMU in the vehicle; empty: the odometer's axes are used
+  int system = 1;
+};
+
+void add_options(CLI::App& command, FlightControllerArguments& args);
+
+class FlightController {
+ public:
+  /// Opens the line; the clock starts with the recording's `first_ns`. Throws InputError if it is not known how the IMU
+  /// sits in the vehicle.
+  FlightController(const FlightControllerArguments& args, const Calibration& calibration, TimeNs first_ns);
+
+  /// Call before each sample is handed to `odometry`: waits until it is time for it.
+  void before_sample(const Sample& sample, const Odometry& odometry);
+
+  /// Call with the outcome of each frame.
+  void after_frame(const ReplayedFrame& frame, const Odometry& odometry);
+
+  /// One line about the conversation.
+  [[nodiscard]] std::string report() const;
+
+ private:
+  void announce(mavlink::Health health);
+
+  RealTimeClock clock_;
+  mavlink::OdometryStream stream_;
+  std::optional<TimeNs> last_imu_ns_;
+  mavlink::Health announced_ = mavlink::Health::starting;
+  mavlink::Link link_;  ///< last: its thread reads the clock
+};
+
+}  // namespace ear::tools
