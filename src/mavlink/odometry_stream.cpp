@@ -27,7 +27,7 @@ int messages_per_frame(double frame_interval) {
 StatusText to_text(Health health) {
   switch (health) {
     case Health::starting:
-      return {Severity::notice, "ear: not started, stand still"};
+      return {Severity::notice, "ear: not started"};
     case Health::good:
       return {Severity::notice, "ear: tracking"};
     case Health::weak:

@@ -253,7 +253,7 @@ class Stream(unittest.TestCase):
     def test_nothing_before_the_start_and_texts_about_it(self):
         names = [packet["name"] for packet in self.packets]
         texts = [fields["text"] for fields in self.fields("STATUSTEXT")]
-        self.assertEqual(texts, ["ear: not started, stand still", "ear: tracking"])
+        self.assertEqual(texts, ["ear: not started", "ear: tracking"])
         self.assertGreater(names.index("ODOMETRY"), names.index("STATUSTEXT", names.index("STATUSTEXT") + 1))
 
     def test_time_requests(self):
