@@ -41,7 +41,8 @@ def install_decoder():
         except subprocess.TimeoutExpired:
             return None, "npm's registry does not answer"
         if done.returncode != 0:
-            return None, "npm could not install node-mavlink: " + done.stderr.strip().splitlines()[-1]
+            errors = [line for line in done.stderr.splitlines() if "error" in line]
+            return None, "npm could not install node-mavlink: " + "; ".join(errors[:2])
     return SCRATCH, ""
 
 
