@@ -1,5 +1,5 @@
 // The displacement of the axle's middle O between two instants i and j, from wheels, gyroscope and the ground's normal:
-// the paper's pre-integration, (9)-(11). Derivation: docs/filter.md, section 9.
+// the paper's pre-integration, (9)-(11). Derivation: docs/filter.md, section 10.
 //
 //   alpha = sum over encoder intervals k of R_BiBk f_k s_k dt
 //   s_k dt = mean over both wheels of radius * (turn relative to the body + turn of the body about the axle)
