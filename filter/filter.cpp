@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "filter/displacement_update.h"
 #include "filter/ground.h"
 #include "filter/rolling_start.h"
 
@@ -19,14 +20,15 @@ constexpr double kSlipEnds = 0.15;           // [s] of agreement before a row th
 constexpr double kRollingWindow = 2.0;       // [s] of samples kept for a start while rolling
 constexpr double kRollingStart = 1.5;        // [s] of them that it takes
 constexpr double kRollingVelocity = 0.5;     // [m/s] and share of the speed: before the samples of the window are used
-constexpr double kTooLate = 0.1;             // [s] behind the state: a reading that comes so late is not used
-constexpr double kWheelAge = 0.1;            // [s] older readings do not tell whether the wheels rest
-constexpr double kHeldSample = 0.02;         // [s] so far the newest IMU sample may stand in for one that is missing
-constexpr double kGapNoiseFactor = 10.0;     // on the noise densities while a gap in the IMU data is bridged
-constexpr double kStartGravityNoise = 0.02;  // [m/s^2] what idling rotors leave in the mean specific force
-constexpr double kKnownSigma = 1e-6;         // [m, rad] of position and yaw at the start: by definition zero
-constexpr double kUnknownTilt = 0.3;         // [rad] before gravity was measured
-constexpr std::size_t kMinObservations = 2;  // clones that must have seen a feature
+constexpr TimeNs kMissedReading = 50'000'000;  // [ns] without wheel readings: a displacement has a hole
+constexpr double kTooLate = 0.1;               // [s] behind the state: a reading that comes so late is not used
+constexpr double kWheelAge = 0.1;              // [s] older readings do not tell whether the wheels rest
+constexpr double kHeldSample = 0.02;           // [s] so far the newest IMU sample may stand in for one that is missing
+constexpr double kGapNoiseFactor = 10.0;       // on the noise densities while a gap in the IMU data is bridged
+constexpr double kStartGravityNoise = 0.02;    // [m/s^2] what idling rotors leave in the mean specific force
+constexpr double kKnownSigma = 1e-6;           // [m, rad] of position and yaw at the start: by definition zero
+constexpr double kUnknownTilt = 0.3;           // [rad] before gravity was measured
+constexpr std::size_t kMinObservations = 2;    // clones that must have seen a feature
 
 int error_capacity(const FilterConfig& config) { return err::clone(config.window + 1); }
 
@@ -115,6 +117,7 @@ Filter::Filter(const FilterConfig& config, const Calibration& calibration)
       imu_(kImuCapacity),
       turns_(kWheelCapacity),
       ranges_(kWheelCapacity),
+      displacement_turns_(kWheelCapacity),
       contact_(config.contact, calibration),
       standstill_(config.standstill, focal_px_),
       information_(config.window + 1, config.max_track_updates) {
@@ -236,7 +239,9 @@ std::optional<Estimate> Filter::process(const FeatureFrame& frame) {
   if (still && clone_is_here_) {
     hold_still();
   } else {
+    update_with_displacement();
     append_clone();
+    start_displacement();
     tracks_.add(state_.clones.back().frame, frame.features);
     const std::optional<std::size_t> leaving = clone_to_leave();
     update_with_features(frame, leaving);
@@ -394,7 +399,14 @@ void Filter::advance_measuring(TimeNs t_ns) {
     if (next_ns > t_ns) break;
     advance(next_ns);
     if (wheels_next) {
-      update_with_wheels(turns_.front());
+      if (config_.odometer.update == OdometerUpdate::velocity) {
+        update_with_wheels(turns_.front());
+      } else if (rolls_at(turns_.front().from_ns)) {
+        if (displacement_turns_.full()) displacement_turns_.pop();
+        displacement_turns_.push(turns_.front());
+      } else {
+        displacement_.reset();
+      }
       turns_.pop();
     } else {
       update_with_beams(ranges_.front());
@@ -476,6 +488,77 @@ void Filter::update_with_wheels(const WheelTurn& turn) {
     r(count++) = rows.residual(row) / sigma(row);
   }
   if (count > 0) update(H.topRows(count), err::nu, r.head(count));
+}
+
+/// From the newest clone, which is here and now.
+void Filter::start_displacement() {
+  displacement_.reset();
+  if (!on_ground() || !ground_known_ || config_.odometer.update != OdometerUpdate::displacement) return;
+  const OdometerConfig& odometer = config_.odometer;
+  const EncoderCalibration& encoder = *calibration_.encoder;
+  WheelNoise noise;
+  noise.gyro = calibration_.imu.gyro_noise;
+  noise.reading = encoder.noise_counts * 2.0 * M_PI / static_cast<double>(encoder.resolution);
+  noise.slip = odometer.slip;
+  noise.side_slip = odometer.side_slip;
+  noise.roughness = odometer.roughness;
+  noise.normal_walk = odometer.normal_walk;
+  displacement_.emplace(wheel_model(state_.odometer), noise);
+  displacement_->start(state_.imu.R_WB.transpose() * state_.ground.n_W, state_.imu.b_g);
+  displacement_ns_ = state_.imu.t_ns;
+}
+
+/// Readings do not come when frames do: an interval is shared out in proportion, the last one goes on as it was.
+void Filter::add_to_displacement(TimeNs until_ns) {
+  while (displacement_ && displacement_ns_ < until_ns && !displacement_turns_.empty()) {
+    const WheelTurn& turn = displacement_turns_.front();
+    if (turn.to_ns <= displacement_ns_ && displacement_turns_.size() > 1) {
+      displacement_turns_.pop();
+      continue;
+    }
+    const bool last = displacement_turns_.size() == 1;
+    if (turn.from_ns > displacement_ns_ + kMissedReading || (last && until_ns > turn.to_ns + kMissedReading)) {
+      displacement_.reset();  // readings are missing
+      return;
+    }
+    const TimeNs end_ns = last ? until_ns : std::min(until_ns, turn.to_ns);
+    const double dt = seconds_between(displacement_ns_, end_ns);
+    Eigen::Vector3d turned_B = Eigen::Vector3d::Zero();
+    imu_.for_each_piece(displacement_ns_, end_ns, [&](const Eigen::Vector3d& gyro_B, const Eigen::Vector3d&, double d) {
+      turned_B += gyro_B * d;
+    });
+    displacement_->add_interval(turned_B / dt, dt, turn.angle * (dt / turn.duration()));
+    displacement_ns_ = end_ns;
+  }
+}
+
+/// Before the clone of now: how the axle moved since the newest clone.
+void Filter::update_with_displacement() {
+  if (!displacement_ || state_.clones.empty() || !on_ground()) return;
+  add_to_displacement(state_.imu.t_ns);
+  if (!displacement_ || displacement_ns_ < state_.imu.t_ns) return;
+  const WheelDisplacement z = displacement_->result();
+  if (!z.usable) return;
+  const int newest = static_cast<int>(state_.clones.size()) - 1;
+  const DisplacementRows rows = linearize_displacement(state_, newest, z);
+  const int clone = err::clone(newest);
+  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(3, clone + err::clone_size);
+  H.leftCols<err::camera>() = rows.H;
+  H.rightCols<err::clone_size>() = rows.H_clone;
+  const double floor = config_.odometer.speed_sigma * z.duration;
+  const Eigen::Matrix3d R = rows.covariance + floor * floor * Eigen::Matrix3d::Identity();
+  const Eigen::LLT<Eigen::Matrix3d> llt(R);
+  H = llt.matrixL().solve(H).eval();
+  const Eigen::Vector3d r = llt.matrixL().solve(rows.residual);
+  const auto P = covariance_.matrix().topLeftCorner(H.cols(), H.cols());
+  const Eigen::Matrix3d S = H * P * H.transpose() + Eigen::Matrix3d::Identity();
+  const bool passes = r.dot(S.ldlt().solve(r)) <= gate_(3);
+  if (!agrees_again(agrees_since_ns_[WheelRows::speed], passes, state_.imu.t_ns)) {
+    statistics_.wheel_rows_rejected += 3;
+    return;
+  }
+  statistics_.wheel_rows_used += 3;
+  update(H, 0, r);
 }
 
 void Filter::update_with_beams(const BeamRanges& reading) {

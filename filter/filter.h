@@ -23,6 +23,7 @@
 #include "filter/standstill.h"
 #include "filter/state.h"
 #include "filter/tracks.h"
+#include "filter/wheel_preintegration.h"
 #include "filter/wheels.h"
 
 namespace ear {
@@ -95,6 +96,9 @@ class Filter {
   [[nodiscard]] bool rolls_at(TimeNs t_ns) const;
   static bool agrees_again(TimeNs& since_ns, bool passes, TimeNs t_ns);
   void update_with_wheels(const WheelTurn& turn);
+  void start_displacement();
+  void add_to_displacement(TimeNs until_ns);
+  void update_with_displacement();
   void update_with_beams(const BeamRanges& reading);
   void restart_ground(const BeamRanges& reading, const Eigen::Matrix3d& R_WB);
   void hold_still();
@@ -125,7 +129,10 @@ class Filter {
   Ring<WheelTurn> turns_;    ///< not yet passed by the state
   Ring<BeamRanges> ranges_;  ///< the same
   TimeNs last_range_ns_ = 0;
-  bool ground_known_ = false;  ///< the lasers saw the ground since it was last touched
+  bool ground_known_ = false;                        ///< the lasers saw the ground since it was last touched
+  std::optional<WheelPreintegration> displacement_;  ///< since the newest clone
+  Ring<WheelTurn> displacement_turns_;               ///< not yet used up by it
+  TimeNs displacement_ns_ = 0;                       ///< up to where it goes
   ContactDetector contact_;
   std::array<TimeNs, WheelRows::size> agrees_since_ns_{};  ///< each row of the odometer with the state; kDisagrees
   WheelRest wheel_rest_;

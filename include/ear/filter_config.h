@@ -51,9 +51,16 @@ enum class OdometerModel : std::uint8_t {
   terrain        ///< the paper's: pitch rate taken into account, direction along the ground that the lasers see
 };
 
+/// How the wheels enter the filter.
+enum class OdometerUpdate : std::uint8_t {
+  velocity,     ///< at every reading of the encoders
+  displacement  ///< once per frame, pre-integrated since the clone before
+};
+
 /// Wheels and lasers. What slips or bumps grows with the square root of the distance: [m] per sqrt(m).
 struct OdometerConfig {
   OdometerModel model = OdometerModel::terrain;
+  OdometerUpdate update = OdometerUpdate::velocity;  ///< displacement: with the terrain model only
   bool yaw_rate = false;         ///< use the difference of the wheels with OdometerModel::terrain too
   double slip = 1e-3;            ///< along the track [m/sqrt(m)]
   double side_slip = 2e-3;       ///< across it [m/sqrt(m)]
@@ -68,14 +75,14 @@ struct OdometerConfig {
 
 /// When the vehicle is on the ground, and when it flies.
 struct ContactConfig {
-  double takeoff_height = 0.005;     ///< [m] wheels above the ground, after standing, that are a take-off
-  double unevenness = 0.025;         ///< [m] on top of it while they roll
-  double takeoff_duration = 0.04;    ///< [s] for which the beams must say so
-  double touchdown_height = 0.025;   ///< [m] wheels below it, neither rising nor falling, stand on the ground
-  double touchdown_duration = 0.2;   ///< [s] for which the beams must say so
-  double touchdown_climb = 0.06;     ///< [m/s] neither rising nor falling
-  double confirmed_height = 0.05;    ///< [m] below it a strike, or wheels that are spun up, is a touchdown at once
-  double strike = 10.0;              ///< [m/s^2] change of the specific force's magnitude
+  double takeoff_height = 0.005;    ///< [m] wheels above the ground, after standing, that are a take-off
+  double unevenness = 0.025;        ///< [m] on top of it while they roll
+  double takeoff_duration = 0.04;   ///< [s] for which the beams must say so
+  double touchdown_height = 0.025;  ///< [m] wheels below it, neither rising nor falling, stand on the ground
+  double touchdown_duration = 0.2;  ///< [s] for which the beams must say so
+  double touchdown_climb = 0.06;    ///< [m/s] neither rising nor falling
+  double confirmed_height = 0.05;   ///< [m] below it a strike, or wheels that are spun up, is a touchdown at once
+  double strike = 10.0;             ///< [m/s^2] change of the specific force's magnitude
 };
 
 struct FilterConfig {

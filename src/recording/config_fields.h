@@ -30,6 +30,11 @@ const char* name_of(E choice) {
   throw std::logic_error("a choice without a name in config_fields.h");
 }
 
+constexpr auto names_of(OdometerUpdate) {
+  return std::array<std::pair<const char*, OdometerUpdate>, 2>{
+      {{"velocity", OdometerUpdate::velocity}, {"displacement", OdometerUpdate::displacement}}};
+}
+
 /// C is T, or T and const.
 template <typename C, typename T>
 using EnableFor = std::enable_if_t<std::is_same_v<std::remove_const_t<C>, T>>;
@@ -81,6 +86,7 @@ EnableFor<C, OnlineCalibrationConfig> visit(C& c, F&& f) {
 template <typename C, typename F>
 EnableFor<C, OdometerConfig> visit(C& c, F&& f) {
   f("model", c.model);
+  f("update", c.update);
   f("yaw_rate", c.yaw_rate);
   f("slip", c.slip);
   f("side_slip", c.side_slip);
