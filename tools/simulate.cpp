@@ -11,6 +11,7 @@
 #include "tools/commands.h"
 #include "tools/progress.h"
 #include "tools/simulator/faults.h"
+#include "tools/simulator/picture_files.h"
 #include "tools/simulator/recording_writer.h"
 #include "tools/simulator/sequence.h"
 #include "tools/simulator/simulation.h"
@@ -35,11 +36,15 @@ void simulate(const SimulateArguments& args) {
   if (!args.images_from.empty()) simulator::require_same_pictures(simulation, args.images_from);
   simulator::write_recording(simulation, args.out);
 
+  std::vector<simulator::Shot> pictures;
   if (!args.images_from.empty()) {
-    simulator::link_images(simulation, args.out, args.images_from);
+    pictures = simulator::link_images(simulation, args.out, args.images_from);
   } else if (!args.no_images) {
+    pictures = simulator::all_pictures(simulation);
+  }
+  if (!pictures.empty()) {
     Progress progress;
-    simulator::render_images(simulation, args.out, args.threads, [&](std::size_t done, std::size_t total) {
+    simulator::render_images(simulation, pictures, args.out, args.threads, [&](std::size_t done, std::size_t total) {
       progress.show("rendering " + std::to_string(done) + " of " + std::to_string(total) + " images");
     });
     progress.finish();
@@ -74,7 +79,9 @@ void add_simulate_command(CLI::App& app) {
                     "write the true calibration instead of a slightly wrong one; all else stays the same");
   command->add_option("--fault", args->faults, "what goes wrong, as NAME@START+DURATION (below); may be repeated");
   CLI::Option* no_images = command->add_flag("--no-images", args->no_images, "everything but the pictures");
-  command->add_option("--images-from", args->images_from, "link the pictures of this recording of the same simulation")
+  command
+      ->add_option("--images-from", args->images_from,
+                   "link the pictures of this recording of the same simulation; faulty ones are rendered")
       ->excludes(no_images);
   command->add_option("--threads", args->threads, "that render; the pictures do not depend on it")
       ->capture_default_str()

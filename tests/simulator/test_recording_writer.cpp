@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "src/recording/recording.h"
+#include "tools/simulator/picture_files.h"
 #include "tools/simulator/recording_writer.h"
 #include "tools/simulator/simulation.h"
 
@@ -166,15 +167,15 @@ TEST_CASE("recording: pictures do not depend on the threads, and serve the other
   const Simulation perfect(options);
   write_recording(imperfect, folder / "imperfect");
   std::size_t told = 0;
-  render_images(imperfect, folder / "imperfect", 1, [&](std::size_t done, std::size_t total) {
+  render_images(imperfect, all_pictures(imperfect), folder / "imperfect", 1, [&](std::size_t done, std::size_t total) {
     CHECK(done == ++told);
     CHECK(total == 2 * imperfect.frame_times().size());
   });
   CHECK(told == 2 * imperfect.frame_times().size());
-  render_images(imperfect, folder / "threads", 3, no_progress);
+  render_images(imperfect, all_pictures(imperfect), folder / "threads", 3, no_progress);
   write_recording(perfect, folder / "perfect");
   CHECK_NOTHROW(require_same_pictures(perfect, folder / "imperfect"));
-  link_images(perfect, folder / "perfect", folder / "imperfect");
+  CHECK(link_images(perfect, folder / "perfect", folder / "imperfect").empty());
   for (const ear::TimeNs t_ns : imperfect.frame_times()) {
     for (const std::size_t camera : {0U, 1U}) {
       const std::string bytes = bytes_of(image_path(folder / "imperfect", camera, t_ns));
@@ -191,6 +192,56 @@ TEST_CASE("recording: pictures do not depend on the threads, and serve the other
                        std::runtime_error);
   CHECK_THROWS_WITH_AS(require_same_pictures(other, folder / "nowhere"), doctest::Contains("simulation.yaml"),
                        std::runtime_error);
+}
+
+TEST_CASE("recording: a faulty one takes from a clean one all pictures that are the same") {
+  const TemporaryFolder folder;
+  Options options = short_drive(48);
+  options.duration = 0.4;  // frames at 0.11, 0.21, 0.31 and 0.41 s
+  const Simulation clean(options);
+  write_recording(clean, folder / "clean");
+  render_images(clean, all_pictures(clean), folder / "clean", 2, no_progress);
+
+  options.faults = {parse_fault("camera_dark.right@0.2+0.1"), parse_fault("camera_frozen.left@0.3+0.1"),
+                    parse_fault("clock_jump@0.3+0.1=-0.1"), parse_fault("encoder_frozen@0.1+0.1")};
+  const Simulation faulty(options);
+  write_recording(faulty, folder / "direct");
+  render_images(faulty, all_pictures(faulty), folder / "direct", 2, no_progress);
+  write_recording(faulty, folder / "linked");
+  CHECK_NOTHROW(require_same_pictures(faulty, folder / "clean"));
+  const std::vector<Shot> missing = link_images(faulty, folder / "linked", folder / "clean");
+  REQUIRE(missing.size() == 1);
+  CHECK(missing[0].exposure == 1);
+  CHECK(missing[0].camera == 1);
+  render_images(faulty, missing, folder / "linked", 1, no_progress);
+  write_recording(faulty, folder / "again");
+  CHECK_NOTHROW(require_same_pictures(faulty, folder / "linked"));
+  CHECK(link_images(faulty, folder / "again", folder / "linked").empty());
+  const auto bytes = [&](const char* name, std::size_t camera, std::size_t exposure) {
+    return bytes_of(image_path(folder / name, camera, faulty.exposures()[exposure]));
+  };
+  for (std::size_t exposure = 0; exposure < 4; ++exposure) {
+    CAPTURE(exposure);
+    for (const std::size_t camera : {0U, 1U}) {
+      CHECK(bytes("direct", camera, exposure) == bytes("linked", camera, exposure));
+      CHECK(bytes("direct", camera, exposure) == bytes("again", camera, exposure));
+    }
+    CHECK((bytes("direct", 0, exposure) == bytes("clean", 0, exposure)) == (exposure != 2));
+    CHECK((bytes("direct", 1, exposure) == bytes("clean", 1, exposure)) == (exposure != 1));
+  }
+  CHECK(bytes("direct", 0, 2) == bytes("clean", 0, 1));
+
+  // Stamps jump, file names do not: two frames have one stamp here.
+  const std::vector<std::string> rows = lines_of(folder / "direct/mav0/cam0/data.csv");
+  REQUIRE(rows.size() == 5);
+  CHECK(rows[3] == "1600000000208300000,1600000000308300000.png");
+
+  // Pictures with other faults, or with faults where none are wanted, are not the same.
+  CHECK_THROWS_WITH_AS(require_same_pictures(clean, folder / "direct"), doctest::Contains("camera_dark.right"),
+                       std::runtime_error);
+  options.faults = {parse_fault("camera_dark.right@0.2+0.2")};
+  CHECK_THROWS_WITH_AS(require_same_pictures(Simulation(options), folder / "direct"),
+                       doctest::Contains("camera_dark.right@0.2+0.2"), std::runtime_error);
 }
 
 }  // namespace ear::simulator

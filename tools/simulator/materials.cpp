@@ -470,6 +470,8 @@ double brightness_of(const Panel& panel) {
 
 }  // namespace
 
+Texture paint_panel(const Panel& panel, Rng& rng) { return paint(panel, 1.0, rng); }
+
 Appearance paint_room(const Scene& scene, std::uint64_t seed) {
   Rng rng = make_rng(seed, Stream::scene);
   const Panel ground{Eigen::Vector3d::Zero(), Eigen::Vector3d::UnitX(), Eigen::Vector3d::UnitY(),

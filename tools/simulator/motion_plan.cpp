@@ -33,7 +33,8 @@ constexpr double kFreeAbove = 0.50;          // [m] from here on the attitude is
 // Touchdown: the tyres are a damped spring that stops the fall within about 12 ms and throws the vehicle back a little.
 constexpr double kStrikeFrequency = 115.0;  // [rad/s]
 constexpr double kStrikeDamping = 0.35;
-constexpr double kSettled = 0.15;  // [s] after which the bounce is below 0.02 mm
+constexpr double kStrikePeak = 0.83;  // largest acceleration, in units of speed times frequency, at this damping
+constexpr double kSettled = 0.15;     // [s] after which the bounce is below 0.02 mm
 constexpr double kKick = 3.0 * kDegree;
 constexpr double kKickFrequency = 1.6;  // [Hz] the body swings after the strike
 constexpr double kKickDecay = 0.35;     // [s]
@@ -117,16 +118,27 @@ struct Heights {
   std::vector<double> touchdowns;
 };
 
-double strike(double speed, double tau) {
-  const double damped = kStrikeFrequency * std::sqrt(1.0 - kStrikeDamping * kStrikeDamping);
-  return -speed / damped * std::exp(-kStrikeDamping * kStrikeFrequency * tau) * std::sin(damped * tau);
+double strike(double speed, double frequency, double tau) {
+  const double damped = frequency * std::sqrt(1.0 - kStrikeDamping * kStrikeDamping);
+  return -speed / damped * std::exp(-kStrikeDamping * frequency * tau) * std::sin(damped * tau);
 }
 
-Heights integrate_heights(const std::vector<double>& climb) {
+// Of the tyres [rad/s] at this touchdown.
+double strike_frequency(const std::vector<HardLanding>& hard_landings, double touchdown, double speed) {
+  for (const HardLanding& landing : hard_landings) {
+    if (landing.begin <= touchdown && touchdown < landing.end) {
+      return (landing.peak - 1.0) * kGravity / (kStrikePeak * speed);
+    }
+  }
+  return kStrikeFrequency;
+}
+
+Heights integrate_heights(const std::vector<double>& climb, const std::vector<HardLanding>& hard_landings) {
   Heights result;
   Mode mode = Mode::ground;
   double height = 0.0;
   double impact_speed = 0.0;
+  double frequency = kStrikeFrequency;
   bool settling = false;
   for (std::size_t i = 0; i < climb.size(); ++i) {
     const double t = kPeriod * static_cast<double>(i);
@@ -135,14 +147,15 @@ Heights integrate_heights(const std::vector<double>& climb) {
       if (height <= 0.0 && climb[i] < 0.0) {
         impact_speed = -climb[i];
         result.touchdowns.push_back(t - height / climb[i]);
+        frequency = strike_frequency(hard_landings, result.touchdowns.back(), impact_speed);
         settling = true;
       }
     }
     double now = height;
     if (settling) {
       const double tau = t - result.touchdowns.back();
-      now = strike(impact_speed, tau);
-      if (tau > kSettled) {
+      now = strike(impact_speed, frequency, tau);
+      if (tau > kSettled * std::max(1.0, kStrikeFrequency / frequency)) {
         settling = false;
         mode = Mode::ground;
         height = now = 0.0;
@@ -207,9 +220,10 @@ class GroundPath {
 
 }  // namespace
 
-MotionPlan plan_motion(const Sequence& sequence, const EncoderCalibration& axle, Rng& rng) {
+MotionPlan plan_motion(const Sequence& sequence, const EncoderCalibration& axle, Rng& rng,
+                       const std::vector<HardLanding>& hard_landings) {
   const Commands commands = smooth_commands(sequence.legs);
-  const Heights heights = integrate_heights(commands.climb);
+  const Heights heights = integrate_heights(commands.climb, hard_landings);
   const auto n = static_cast<Eigen::Index>(commands.forward.size());
   const auto at = [](const std::vector<double>& values, Eigen::Index i) { return values[static_cast<std::size_t>(i)]; };
 

@@ -22,7 +22,15 @@ struct MotionPlan {
   std::vector<std::array<double, 2>> slip = {};
 };
 
-/// Plans the sequence for a vehicle with this axle. `rng` draws the phases of swings and gusts.
-[[nodiscard]] MotionPlan plan_motion(const Sequence& sequence, const EncoderCalibration& axle, Rng& rng);
+/// How hard the wheels strike at touchdowns within a time: tyres as stiff as gives this peak.
+struct HardLanding {
+  double begin = 0.0, end = 0.0;  ///< [s]
+  double peak = 0.0;              ///< of the specific force in units of gravity, before any sensor averages it
+};
+
+/// Plans the sequence for a vehicle with this axle. `rng` draws the phases of swings and gusts. A hard landing changes
+/// the motion for 0.15 s (up to 0.2 s where it makes it softer) after the touchdown, and nothing else.
+[[nodiscard]] MotionPlan plan_motion(const Sequence& sequence, const EncoderCalibration& axle, Rng& rng,
+                                     const std::vector<HardLanding>& hard_landings = {});
 
 }  // namespace ear::simulator

@@ -9,7 +9,6 @@ namespace ear::simulator {
 namespace {
 
 constexpr double kCovering = 0.3;    // [s] that it takes to cover the lenses
-constexpr double kCoverGrey = 6.0;   // no cover is quite tight
 constexpr double kBaseline = 0.05;   // [m] of the parallax; blades need not meet it to the millimetre
 constexpr double kSoftness = 0.012;  // blades are out of focus: width of their edges, in units of a ray
 

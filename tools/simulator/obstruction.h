@@ -13,6 +13,9 @@
 
 namespace ear::simulator {
 
+/// Grey level of a covered lens: no cover is quite tight.
+inline constexpr double kCoverGrey = 6.0;
+
 /// Both cameras look past the same blades, at their parallax. Times are those of the motion [s].
 class Obstruction {
  public:

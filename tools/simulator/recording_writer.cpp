@@ -1,22 +1,15 @@
 #include "tools/simulator/recording_writer.h"
 
 #include <Eigen/Geometry>
-#include <atomic>
 #include <cmath>
 #include <cstdarg>
 #include <cstdio>
-#include <exception>
-#include <fstream>
 #include <memory>
-#include <mutex>
-#include <opencv2/imgcodecs.hpp>
-#include <sstream>
 #include <stdexcept>
-#include <thread>
 #include <vector>
 
-#include "tools/simulator/materials.h"
-#include "tools/simulator/renderer.h"
+#include "tools/simulator/picture_files.h"
+#include "tools/simulator/sensors.h"
 
 namespace ear::simulator {
 namespace {
@@ -197,18 +190,6 @@ void write_faults(const Simulation& simulation, const fs::path& mav0) {
   csv.close();
 }
 
-// What pictures depend on, one key per line. Recordings that agree here may share their pictures.
-std::vector<std::string> picture_origin(const Simulation& simulation) {
-  const Options& options = simulation.options();
-  std::vector<std::string> lines{"sequence: " + options.sequence, "seed: " + std::to_string(options.seed),
-                                 "frames: " + std::to_string(simulation.frame_times().size()),
-                                 "camera_rate_hz: " + std::to_string(options.camera_rate_hz)};
-  lines.emplace_back(options.lens == LensModel::equidistant ? "lens: equidistant" : "lens: radial-tangential");
-  return lines;
-}
-
-fs::path origin_file(const fs::path& directory) { return directory / "simulation.yaml"; }
-
 void write_origin(const Simulation& simulation, const fs::path& directory) {
   TextFile yaml(origin_file(directory));
   yaml.print("# What made this recording. The first lines decide which pictures it can share with another one.\n");
@@ -233,93 +214,6 @@ void write_recording(const Simulation& simulation, const fs::path& directory) {
   write_truth(simulation, mav0);
   write_faults(simulation, mav0);
   write_origin(simulation, directory);
-}
-
-fs::path image_path(const fs::path& directory, std::size_t camera, TimeNs taken_ns) {
-  return directory / "mav0" / ("cam" + std::to_string(camera)) / "data" / (std::to_string(taken_ns) + ".png");
-}
-
-void render_images(const Simulation& simulation, const fs::path& directory, int threads, const Progress& progress) {
-  const Appearance appearance = paint_room(simulation.scene(), simulation.options().seed);
-  const std::vector<CameraCalibration>& cameras = simulation.true_calibration().cameras;
-  const Renderer renderer(simulation.scene(), appearance, cameras);
-  const ImageSensor sensor;
-  const std::vector<Frame>& frames = simulation.frames();
-  const std::size_t total = frames.size() * cameras.size();
-  for (std::size_t camera = 0; camera < cameras.size(); ++camera) {
-    fs::create_directories(image_path(directory, camera, 0).parent_path());
-  }
-
-  // Level 1 with run lengths: noise does not compress, and the encoder must not cost more than the picture.
-  const std::vector<int> png{cv::IMWRITE_PNG_COMPRESSION, 1, cv::IMWRITE_PNG_STRATEGY, cv::IMWRITE_PNG_STRATEGY_RLE};
-  const auto make_picture = [&](std::size_t index) {
-    const Frame& frame = frames[index / cameras.size()];
-    const std::size_t camera = index % cameras.size();
-    const double t = motion_time(frame.taken_ns);
-    const Obstruction& obstruction = simulation.obstruction();
-    cv::Mat grey(cameras[camera].height, cameras[camera].width, CV_32FC1, cv::Scalar(0.0));
-    if (!obstruction.covered(t)) {
-      grey = renderer.render(camera, simulation.plan().trajectory, t, exposure_at(t, simulation.options().seed));
-    }
-    draw_obstruction(obstruction, cameras[camera], camera, t, grey);
-    const fs::path path = image_path(directory, camera, frame.taken_ns);
-    if (!cv::imwrite(path.string(), sensor.read(grey, picture_key(simulation.options().seed, frame.taken_ns, camera)),
-                     png)) {
-      throw std::runtime_error(path.string() + ": cannot be written");
-    }
-  };
-
-  std::atomic<std::size_t> next{0};
-  std::size_t done = 0;
-  std::exception_ptr failure;
-  std::mutex mutex;  // of `done`, `failure` and the progress
-  const auto work = [&] {
-    try {
-      for (std::size_t index = next++; index < total; index = next++) {
-        make_picture(index);
-        const std::lock_guard lock(mutex);
-        progress(++done, total);
-      }
-    } catch (...) {
-      const std::lock_guard lock(mutex);
-      failure = std::current_exception();
-      next = total;  // the others stop, too
-    }
-  };
-  std::vector<std::thread> pool;
-  for (int i = 1; i < threads; ++i) pool.emplace_back(work);
-  work();
-  for (std::thread& thread : pool) thread.join();
-  if (failure) std::rethrow_exception(failure);
-}
-
-void require_same_pictures(const Simulation& simulation, const fs::path& other) {
-  const fs::path origin = origin_file(other);
-  std::ifstream file(origin);
-  if (!file) throw std::runtime_error(origin.string() + ": cannot be read; is that a simulated recording?");
-  std::string line;
-  std::getline(file, line);  // a comment
-  for (const std::string& expected : picture_origin(simulation)) {
-    std::getline(file, line);
-    if (line != expected) {
-      std::ostringstream message;
-      message << origin.string() << ": says '" << line << "', the pictures needed are of '" << expected << "'";
-      throw std::runtime_error(message.str());
-    }
-  }
-}
-
-void link_images(const Simulation& simulation, const fs::path& directory, const fs::path& other) {
-  for (std::size_t camera = 0; camera < simulation.calibration().cameras.size(); ++camera) {
-    fs::create_directories(image_path(directory, camera, 0).parent_path());
-    for (const Frame& frame : simulation.frames()) {
-      const fs::path from = image_path(other, camera, frame.taken_ns);
-      const fs::path to = image_path(directory, camera, frame.taken_ns);
-      std::error_code cannot_link;
-      fs::create_hard_link(from, to, cannot_link);
-      if (cannot_link) fs::copy_file(from, to);
-    }
-  }
 }
 
 }  // namespace ear::simulator

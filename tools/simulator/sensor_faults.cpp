@@ -141,6 +141,7 @@ void fault_imu(std::vector<ImuSample>& samples, std::vector<ImuBias>& biases, co
     add_jolts(samples, fault, rng);
     clip(samples, fault);
   });
+  each(faults, FaultKind::hard_landing, [&](const Fault& fault) { clip(samples, fault); });
   each(faults, FaultKind::imu_gap, [&](const Fault& fault) {
     const Span span = span_of(samples, fault);
     samples.erase(samples.begin() + static_cast<std::ptrdiff_t>(span.first),
@@ -187,7 +188,7 @@ void fault_lasers(std::vector<LaserSample>& samples, const LaserCalibration& las
   });
 }
 
-TimeNs clock_error(const std::vector<Fault>& faults, ClockedStream stream, TimeNs t_ns) {
+TimeNs clock_error(const std::vector<Fault>& faults, SensorStream stream, TimeNs t_ns) {
   TimeNs error = 0;
   each(faults, FaultKind::clock_jump, [&](const Fault& fault) {
     if (fault.hits(static_cast<std::size_t>(stream)) && fault.active(motion_time(t_ns))) {

@@ -24,15 +24,15 @@ void fault_encoders(std::vector<EncoderSample>& samples, const EncoderCalibratio
 /// Beams that stick, are biased, or give nothing.
 void fault_lasers(std::vector<LaserSample>& samples, const LaserCalibration& lasers, const std::vector<Fault>& faults);
 
-/// The streams whose clocks can jump: FaultType::targets of clock_jump without the first.
-enum class ClockedStream { imu, encoder, laser, camera };
+/// The streams of samples, each with a clock that may jump: FaultType::targets of clock_jump without the first.
+enum class SensorStream { imu, encoder, laser, camera };
 
 /// What jumping clocks add to a stamp [ns].
-[[nodiscard]] TimeNs clock_error(const std::vector<Fault>& faults, ClockedStream stream, TimeNs t_ns);
+[[nodiscard]] TimeNs clock_error(const std::vector<Fault>& faults, SensorStream stream, TimeNs t_ns);
 
 /// Stamps by the jumping clocks; the order of the samples stays.
 template <typename Sample>
-void fault_clock(std::vector<Sample>& samples, const std::vector<Fault>& faults, ClockedStream stream) {
+void fault_clock(std::vector<Sample>& samples, const std::vector<Fault>& faults, SensorStream stream) {
   for (Sample& sample : samples) sample.t_ns += clock_error(faults, stream, sample.t_ns);
 }
 

@@ -7,6 +7,7 @@
 
 #include "tools/simulator/sensor_faults.h"
 #include "tools/simulator/sequence.h"
+#include "tools/simulator/track_faults.h"
 #include "tools/simulator/vehicle.h"
 
 namespace ear::simulator {
@@ -45,9 +46,35 @@ Calibration told_calibration(const Options& options, const Calibration& truth) {
   return miscalibrate(truth, rng);
 }
 
-MotionPlan planned(const Options& options, const Sequence& sequence, const EncoderCalibration& axle) {
+std::shared_ptr<const MotionPlan> planned(const Options& options, const Sequence& sequence,
+                                          const EncoderCalibration& axle) {
+  std::vector<HardLanding> hard_landings;
+  for (const Fault& fault : options.faults) {
+    if (fault.kind == FaultKind::hard_landing) hard_landings.push_back({fault.start, fault.end(), fault.parameter});
+  }
   Rng rng = make_rng(options.seed, Stream::motion);
-  return plan_motion(sequence, axle, rng);
+  auto plan = std::make_shared<const MotionPlan>(plan_motion(sequence, axle, rng, hard_landings));
+  for (const HardLanding& landing : hard_landings) {
+    const auto within = [&landing](double t) { return landing.begin <= t && t < landing.end; };
+    if (std::none_of(plan->touchdowns.begin(), plan->touchdowns.end(), within)) {
+      throw std::invalid_argument("fault 'hard_landing': nothing lands within " + std::to_string(landing.begin) +
+                                  " to " + std::to_string(landing.end) + " s");
+    }
+  }
+  return plan;
+}
+
+std::vector<Passerby> people_in(const Options& options, const Trajectory& trajectory, const Scene& scene) {
+  std::vector<Passerby> people;
+  for (const Fault& fault : options.faults) {
+    if (fault.kind == FaultKind::people) people.emplace_back(fault, trajectory, scene);
+  }
+  return people;
+}
+
+Options without_faults(Options options) {
+  options.faults.clear();
+  return options;
 }
 
 Obstruction drawn_obstruction(const Options& options, const Sequence& sequence, double duration) {
@@ -68,6 +95,12 @@ Calibration sensors_of(const Options& options, Calibration calibration) {
   return calibration;
 }
 
+// Samples arrive when they are stamped, by a clock that does not jump.
+template <typename Sample>
+void append_deliveries(std::vector<Delivery>& deliveries, const std::vector<Sample>& samples, SensorStream stream) {
+  for (std::size_t i = 0; i < samples.size(); ++i) deliveries.push_back({samples[i].t_ns, stream, i});
+}
+
 }  // namespace
 
 Simulation::Simulation(const Options& options) : Simulation(checked(options), varied_sequence(options)) {}
@@ -78,14 +111,15 @@ Simulation::Simulation(const Options& options, const Sequence& sequence)
       calibration_(told_calibration(options, true_calibration_)),
       scene_(make_scene(sequence.place, sequence.terrain)),
       plan_(planned(options, sequence, *true_calibration_.encoder)),
-      wheels_(plan_, sequence.terrain, *true_calibration_.encoder),
-      wheel_faults_(options.faults, plan_, wheels_, *true_calibration_.encoder),
-      obstruction_(drawn_obstruction(options, sequence, plan_.trajectory.duration())),
-      duration_(options.duration.value_or(plan_.trajectory.duration() - 0.2)) {
+      wheels_(*plan_, sequence.terrain, *true_calibration_.encoder),
+      wheel_faults_(options.faults, *plan_, wheels_, *true_calibration_.encoder),
+      obstruction_(drawn_obstruction(options, sequence, plan_->trajectory.duration())),
+      passersby_(people_in(options, plan_->trajectory, scene_)),
+      duration_(options.duration.value_or(plan_->trajectory.duration() - 0.2)) {
   const double end = kImuPhase + duration_;
   require_within(options.faults, end);
   const Calibration sensors = sensors_of(options, true_calibration_);
-  const Trajectory& trajectory = plan_.trajectory;
+  const Trajectory& trajectory = plan_->trajectory;
 
   Rng imu_rng = make_rng(options.seed, Stream::imu);
   truth_times_ = regular_stamps(sensors.imu.rate_hz, kImuPhase, end);
@@ -96,13 +130,15 @@ Simulation::Simulation(const Options& options, const Sequence& sequence)
     corrupt_imu(imu_, sensors.imu, biases_, imu_rng);
   }
   fault_imu(imu_, biases_, options.faults, options.seed);
-  fault_clock(imu_, options.faults, ClockedStream::imu);
+  append_deliveries(deliveries_, imu_, SensorStream::imu);
+  fault_clock(imu_, options.faults, SensorStream::imu);
 
   Rng encoder_rng = make_rng(options.seed, Stream::encoder);
   encoders_ = read_encoders(wheels_, *sensors.encoder, regular_stamps(sensors.encoder->rate_hz, kEncoderPhase, end),
                             encoder_rng);
   fault_encoders(encoders_, *sensors.encoder, wheel_faults_, options.faults);
-  fault_clock(encoders_, options.faults, ClockedStream::encoder);
+  append_deliveries(deliveries_, encoders_, SensorStream::encoder);
+  fault_clock(encoders_, options.faults, SensorStream::encoder);
 
   Rng laser_rng = make_rng(options.seed, Stream::laser);
   lasers_ = read_lasers(trajectory, sequence.terrain, *sensors.lasers,
@@ -112,25 +148,37 @@ Simulation::Simulation(const Options& options, const Sequence& sequence)
     corrupt_lasers(lasers_, *sensors.lasers, sequence.laser_faults, laser_fault_rng);
   }
   fault_lasers(lasers_, *sensors.lasers, options.faults);
-  fault_clock(lasers_, options.faults, ClockedStream::laser);
+  append_deliveries(deliveries_, lasers_, SensorStream::laser);
+  fault_clock(lasers_, options.faults, SensorStream::laser);
 
-  frame_times_ = regular_stamps(options.camera_rate_hz, kCameraPhase, end);
+  exposures_ = regular_stamps(options.camera_rate_hz, kCameraPhase, end);
+  frames_ = deliver(exposures_, options.faults, options.seed);
+  for (const Frame& frame : frames_) frame_times_.push_back(frame.t_ns);
+  for (std::size_t i = 0; i < frames_.size(); ++i) {
+    deliveries_.push_back({frames_[i].arrival_ns, SensorStream::camera, i});
+  }
+  std::stable_sort(deliveries_.begin(), deliveries_.end(),
+                   [](const Delivery& a, const Delivery& b) { return a.arrival_ns < b.arrival_ns; });
   if (options.tracks) {
+    const bool lands_hard = std::any_of(options.faults.begin(), options.faults.end(),
+                                        [](const Fault& fault) { return fault.kind == FaultKind::hard_landing; });
+    const auto clean_plan = lands_hard ? planned(without_faults(options), sequence, *true_calibration_.encoder) : plan_;
     Rng track_rng = make_rng(options.seed, Stream::tracks);
-    tracks_ =
-        generate_tracks(scene_, trajectory, sensors.cameras, frame_times_, obstruction_, options.track, track_rng);
+    Tracks clean = generate_tracks(scene_, clean_plan->trajectory, sensors.cameras, exposures_, obstruction_,
+                                   options.track, track_rng);
+    if (options.faults.empty()) {
+      tracks_ = std::move(clean.frames);
+    } else {
+      tracks_ = fault_tracks(clean, frames_,
+                             {options.faults, sensors.cameras, clean_plan->trajectory, trajectory, passersby_,
+                              options.track, options.seed});
+    }
   }
-  for (TimeNs& t_ns : frame_times_) {
-    const TimeNs taken_ns = t_ns;
-    t_ns += clock_error(options.faults, ClockedStream::camera, taken_ns);
-    frames_.push_back({t_ns, taken_ns});
-  }
-  fault_clock(tracks_, options.faults, ClockedStream::camera);
 }
 
 Truth Simulation::truth(TimeNs t_ns) const {
   const double t = motion_time(t_ns);
-  const Kinematics motion = plan_.trajectory.at(t);
+  const Kinematics motion = plan_->trajectory.at(t);
   Truth truth;
   truth.t_ns = t_ns;
   truth.R_WB = motion.R_WB;
@@ -146,8 +194,8 @@ Truth Simulation::truth(TimeNs t_ns) const {
   truth.b_g = (1.0 - f) * biases_[before].gyro + f * biases_[after].gyro;
   truth.b_a = (1.0 - f) * biases_[before].accel + f * biases_[after].accel;
 
-  const auto knot = static_cast<std::size_t>(std::lround(std::max(0.0, t / plan_.trajectory.period())));
-  truth.mode = plan_.mode[std::min(knot, plan_.mode.size() - 1)];
+  const auto knot = static_cast<std::size_t>(std::lround(std::max(0.0, t / plan_->trajectory.period())));
+  truth.mode = plan_->mode[std::min(knot, plan_->mode.size() - 1)];
   truth.n_W = scene_.terrain.normal(motion.p_WO.x(), motion.p_WO.y());
   const Eigen::Vector3d axle_W = motion.R_WO.col(1);
   const Eigen::Vector3d forward_W = axle_W.cross(truth.n_W).normalized();
@@ -162,8 +210,8 @@ Truth Simulation::truth(TimeNs t_ns) const {
 double Simulation::path_length() const {
   double length = 0.0;
   for (std::size_t i = 1; i < truth_times_.size(); ++i) {
-    const Eigen::Vector3d before = plan_.trajectory.at(motion_time(truth_times_[i - 1])).p_WB;
-    length += (plan_.trajectory.at(motion_time(truth_times_[i])).p_WB - before).norm();
+    const Eigen::Vector3d before = plan_->trajectory.at(motion_time(truth_times_[i - 1])).p_WB;
+    length += (plan_->trajectory.at(motion_time(truth_times_[i])).p_WB - before).norm();
   }
   return length;
 }

@@ -7,16 +7,20 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "ear/calibration.h"
 #include "ear/types.h"
+#include "tools/simulator/camera_faults.h"
 #include "tools/simulator/faults.h"
 #include "tools/simulator/motion_plan.h"
 #include "tools/simulator/obstruction.h"
+#include "tools/simulator/passerby.h"
 #include "tools/simulator/scene.h"
+#include "tools/simulator/sensor_faults.h"
 #include "tools/simulator/sensors.h"
 #include "tools/simulator/track_generator.h"
 #include "tools/simulator/wheel_faults.h"
@@ -54,10 +58,11 @@ struct Truth {
   double slip = 0.0;                               ///< speed of the rims over the ground, mean of both wheels [m/s]
 };
 
-/// One stereo frame as it is delivered.
-struct Frame {
-  TimeNs t_ns = 0;      ///< its stamp
-  TimeNs taken_ns = 0;  ///< the middle of its exposure: the same, unless the camera's clock jumps
+/// One sample on its way to the estimator.
+struct Delivery {
+  TimeNs arrival_ns = 0;  ///< in true time, whatever its stamp says; a frame comes 10 ms after it is taken, or later
+  SensorStream stream = SensorStream::imu;
+  std::size_t index = 0;  ///< in imu(), encoders(), lasers() or frames()
 };
 
 class Simulation {
@@ -81,16 +86,24 @@ class Simulation {
   [[nodiscard]] const std::vector<ImuSample>& imu() const { return imu_; }
   [[nodiscard]] const std::vector<EncoderSample>& encoders() const { return encoders_; }
   [[nodiscard]] const std::vector<LaserSample>& lasers() const { return lasers_; }
+  /// The middle of the exposure of every stereo frame, also of those that a fault takes away.
+  [[nodiscard]] const std::vector<TimeNs>& exposures() const { return exposures_; }
+  /// The frames that arrive.
   [[nodiscard]] const std::vector<Frame>& frames() const { return frames_; }
-  /// Stamps of the stereo frames.
+  /// Their stamps.
   [[nodiscard]] const std::vector<TimeNs>& frame_times() const { return frame_times_; }
-  /// Features of one frame. Throws std::out_of_range; without Options::tracks there are none.
+  /// Features of one of these frames. Throws std::out_of_range; without Options::tracks there are none.
   [[nodiscard]] const FeatureFrame& tracks(std::size_t frame) const { return tracks_.at(frame); }
+
+  /// All samples of all sensors in the order in which they arrive; at the same time IMU, encoder, laser, camera.
+  [[nodiscard]] const std::vector<Delivery>& deliveries() const { return deliveries_; }
 
   [[nodiscard]] const Scene& scene() const { return scene_; }
   /// What is before the lenses.
   [[nodiscard]] const Obstruction& obstruction() const { return obstruction_; }
-  [[nodiscard]] const MotionPlan& plan() const { return plan_; }
+  /// Who crosses the view.
+  [[nodiscard]] const std::vector<Passerby>& passersby() const { return passersby_; }
+  [[nodiscard]] const MotionPlan& plan() const { return *plan_; }
   [[nodiscard]] const Options& options() const { return options_; }
 
  private:
@@ -100,19 +113,22 @@ class Simulation {
   Calibration true_calibration_;
   Calibration calibration_;
   Scene scene_;
-  MotionPlan plan_;
+  std::shared_ptr<const MotionPlan> plan_;  // shared: the passers-by refer to it
   WheelMotion wheels_;
   WheelFaults wheel_faults_;
   Obstruction obstruction_;
+  std::vector<Passerby> passersby_;
   double duration_;
   std::vector<TimeNs> truth_times_;
   std::vector<ImuSample> imu_;
   std::vector<ImuBias> biases_;  // at truth_times_
   std::vector<EncoderSample> encoders_;
   std::vector<LaserSample> lasers_;
+  std::vector<TimeNs> exposures_;
   std::vector<Frame> frames_;
   std::vector<TimeNs> frame_times_;  // of frames_
   std::vector<FeatureFrame> tracks_;
+  std::vector<Delivery> deliveries_;
 };
 
 }  // namespace ear::simulator

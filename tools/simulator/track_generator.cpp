@@ -55,7 +55,8 @@ Eigen::Vector2d measure(const CameraCalibration& camera, const Eigen::Vector2d& 
 }
 
 // Fills empty cells of the grid, in random order, with points on whatever the camera sees there.
-void replenish(std::vector<Landmark>& landmarks, std::uint64_t& next_id, const View& view, int max_features, Rng& rng) {
+void replenish(std::vector<Landmark>& landmarks, std::vector<Eigen::Vector3d>& points_W, const View& view,
+               int max_features, Rng& rng) {
   const CameraCalibration& camera = view.camera;
   const Eigen::Isometry3d& T_WC = view.T_WC;
   const int columns = static_cast<int>(std::ceil(camera.width / kCell));
@@ -82,21 +83,21 @@ void replenish(std::vector<Landmark>& landmarks, std::uint64_t& next_id, const V
     if (!hit || hit->range > kFarthest) continue;
     const Eigen::Vector3d p_W = T_WC.translation() + hit->range * direction_W;
     const auto pixel = see(view, p_W);
-    if (pixel) landmarks.push_back({next_id++, p_W, *pixel});
+    if (!pixel) continue;
+    points_W.push_back(p_W);
+    landmarks.push_back({points_W.size(), p_W, *pixel});
   }
 }
 
 }  // namespace
 
-std::vector<FeatureFrame> generate_tracks(const Scene& scene, const Trajectory& trajectory,
-                                          const std::vector<CameraCalibration>& cameras,
-                                          const std::vector<TimeNs>& stamps, const Obstruction& obstruction,
-                                          const TrackOptions& options, Rng& rng) {
+Tracks generate_tracks(const Scene& scene, const Trajectory& trajectory, const std::vector<CameraCalibration>& cameras,
+                       const std::vector<TimeNs>& stamps, const Obstruction& obstruction, const TrackOptions& options,
+                       Rng& rng) {
   const CameraCalibration& left = cameras.front();
-  std::vector<FeatureFrame> frames;
-  frames.reserve(stamps.size());
+  Tracks tracks;
+  tracks.frames.reserve(stamps.size());
   std::vector<Landmark> landmarks;
-  std::uint64_t next_id = 1;
   TimeNs previous_ns = stamps.empty() ? 0 : stamps.front();
   for (const TimeNs t_ns : stamps) {
     const Kinematics motion = trajectory.at(motion_time(t_ns));
@@ -110,7 +111,7 @@ std::vector<FeatureFrame> generate_tracks(const Scene& scene, const Trajectory& 
       if (const auto pixel = see(left_view, landmark.p_W)) kept.push_back({landmark.id, landmark.p_W, *pixel});
     }
     landmarks = std::move(kept);
-    replenish(landmarks, next_id, left_view, options.max_features, rng);
+    replenish(landmarks, tracks.points_W, left_view, options.max_features, rng);
 
     FeatureFrame frame{t_ns, {}};
     frame.features.reserve(landmarks.size());
@@ -127,9 +128,9 @@ std::vector<FeatureFrame> generate_tracks(const Scene& scene, const Trajectory& 
       }
       frame.features.push_back(seen);
     }
-    frames.push_back(std::move(frame));
+    tracks.frames.push_back(std::move(frame));
   }
-  return frames;
+  return tracks;
 }
 
 }  // namespace ear::simulator
