@@ -21,6 +21,9 @@ constexpr double kRollingWindow = 2.0;       // [s] of samples kept for a start 
 constexpr double kRollingStart = 1.5;        // [s] of them that it takes
 constexpr double kRollingVelocity = 0.5;     // [m/s] and share of the speed: before the samples of the window are used
 constexpr TimeNs kMissedReading = 50'000'000;  // [ns] without wheel readings: a displacement has a hole
+constexpr double kAccelSpike = 25.0;         // [m/s^2] of one sample from the mean of its neighbours
+constexpr double kGyroSpike = 2.0;           // [rad/s] the same
+constexpr double kSpikeRatio = 4.0;          // and so many times the difference of these
 constexpr double kTooLate = 0.1;               // [s] behind the state: a reading that comes so late is not used
 constexpr double kWheelAge = 0.1;              // [s] older readings do not tell whether the wheels rest
 constexpr double kHeldSample = 0.02;           // [s] so far the newest IMU sample may stand in for one that is missing
@@ -115,6 +118,7 @@ Filter::Filter(const FilterConfig& config, const Calibration& calibration)
       gate_(config.gate_probability, 4 * (config.window + 1)),
       covariance_(error_capacity(config)),
       imu_(kImuCapacity),
+      impact_guard_(config.impact, calibration.imu),
       turns_(kWheelCapacity),
       ranges_(kWheelCapacity),
       displacement_turns_(kWheelCapacity),
@@ -152,8 +156,28 @@ void Filter::add_imu(const ImuSample& sample) {
   if (status_ == Status::tracking && imu_.size() == kImuCapacity && state_.imu.t_ns < imu_[kImuCapacity / 2].t_ns) {
     advance(imu_[kImuCapacity / 2].t_ns);
   }
+  mend_spike(sample);
   imu_.push(sample);
   if (encoder_) note_contact(contact_.add_imu(sample));
+}
+
+/// One sample that is far from both its neighbours, which agree with each other, is a fault of the sensor or its bus: no
+/// strike lasts for one sample only. The mean of the neighbours takes its place.
+void Filter::mend_spike(const ImuSample& next) {
+  if (imu_.size() < 2) return;
+  const ImuSample& before = imu_[imu_.size() - 2];
+  const ImuSample& suspect = imu_.newest();
+  if (seconds_between(before.t_ns, next.t_ns) > config_.max_imu_gap) return;
+  const auto spike = [](const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c, double least) {
+    const double off = (b - 0.5 * (a + c)).norm();
+    return off > least && off > kSpikeRatio * (c - a).norm();
+  };
+  if (!spike(before.gyro_B, suspect.gyro_B, next.gyro_B, kGyroSpike) &&
+      !spike(before.accel_B, suspect.accel_B, next.accel_B, kAccelSpike)) {
+    return;
+  }
+  imu_.correct_newest(0.5 * (before.gyro_B + next.gyro_B), 0.5 * (before.accel_B + next.accel_B));
+  ++counts_.imu_spikes;
 }
 
 /// After a change of the ground under the wheels nothing is known of it.
@@ -375,6 +399,9 @@ void Filter::advance(TimeNs t_ns) {
   imu_.for_each_piece(state_.imu.t_ns, t_ns,
                       [&](const Eigen::Vector3d& gyro_B, const Eigen::Vector3d& accel_B, double dt) {
                         ImuCalibration noise = calibration_.imu;
+                        const ImuNoiseFactors factors = impact_guard_.add({state_.imu.t_ns, gyro_B, accel_B});
+                        noise.gyro_noise *= factors.gyro;
+                        noise.accel_noise *= factors.accel;
                         if (dt > config_.max_imu_gap) {
                           noise.gyro_noise *= kGapNoiseFactor;
                           noise.accel_noise *= kGapNoiseFactor;

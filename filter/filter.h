@@ -18,6 +18,7 @@
 #include "filter/contact.h"
 #include "filter/covariance.h"
 #include "filter/feature_update.h"
+#include "filter/impact_guard.h"
 #include "filter/imu_buffer.h"
 #include "filter/ring.h"
 #include "filter/standstill.h"
@@ -84,6 +85,7 @@ class Filter {
   static constexpr TimeNs kDisagrees = -1;
 
   [[nodiscard]] TimeNs imu_time(TimeNs camera_time_ns) const;
+  void mend_spike(const ImuSample& next);
   bool try_start(TimeNs t_ns, const ImuStatistics& imu, bool still);
   bool try_rolling_start();
   [[nodiscard]] Eigen::VectorXd start_sigma() const;
@@ -124,6 +126,7 @@ class Filter {
   Covariance covariance_;
   ImuBuffer imu_;
   InputCounts counts_;
+  ImpactGuard impact_guard_;
   Eigen::Vector3d rate_B_ = Eigen::Vector3d::Zero();  ///< mean rate of the last piece integrated, bias removed [rad/s]
   std::optional<EncoderReader> encoder_;
   Ring<WheelTurn> turns_;    ///< not yet passed by the state

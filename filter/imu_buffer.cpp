@@ -44,6 +44,12 @@ ImuSample ImuBuffer::interpolate(std::size_t next, TimeNs t_ns) const {
   return result;
 }
 
+void ImuBuffer::correct_newest(const Eigen::Vector3d& gyro_B, const Eigen::Vector3d& accel_B) {
+  ImuSample& newest = samples_[(first_ + size_ - 1) % samples_.size()];
+  newest.gyro_B = gyro_B;
+  newest.accel_B = accel_B;
+}
+
 ImuStatistics ImuBuffer::statistics(TimeNs from_ns, TimeNs to_ns) const {
   ImuStatistics s;
   const std::size_t begin = first_after(from_ns - 1);

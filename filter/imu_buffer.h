@@ -26,6 +26,8 @@ class ImuBuffer {
 
   void push(const ImuSample& sample);
   void clear() { size_ = 0; }
+  /// Puts other values in place of the newest sample, under the same stamp.
+  void correct_newest(const Eigen::Vector3d& gyro_B, const Eigen::Vector3d& accel_B);
 
   [[nodiscard]] bool empty() const { return size_ == 0; }
   [[nodiscard]] std::size_t size() const { return size_; }

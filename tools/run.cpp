@@ -114,6 +114,7 @@ RunSummary summarize(const RunArguments& args, const Recording& recording, const
                     {"encoder_rejected", inputs.encoder_rejected},
                     {"laser_rejected", inputs.laser_rejected},
                     {"imu_rejected", inputs.imu_rejected},
+                    {"imu_spikes", inputs.imu_spikes},
                     {"imu_gaps", inputs.imu_gaps},
                     {"frames_rejected", inputs.frames_rejected},
                     {"frames_without_imu", inputs.frames_without_imu}};

@@ -85,6 +85,14 @@ struct ContactConfig {
   double strike = 10.0;             ///< [m/s^2] change of the specific force's magnitude
 };
 
+/// Which inertial samples are less certain than the sensor's noise says: strikes, spikes, clipped values.
+struct ImpactConfig {
+  double accel_deviation = 10.0;  ///< [m/s^2] from the recent mean that is ordinary in any case
+  double gyro_deviation = 4.0;    ///< [rad/s]
+  double accel_range = 0.0;       ///< [m/s^2] largest value of an axis; 0: not known, flat tops tell
+  double gyro_range = 0.0;        ///< [rad/s]
+};
+
 struct FilterConfig {
   int window = 12;                     ///< clones kept
   int max_track_updates = 40;          ///< features used per frame, those with most observations first
@@ -98,6 +106,7 @@ struct FilterConfig {
   OnlineCalibrationConfig online_calibration;
   OdometerConfig odometer;
   ContactConfig contact;
+  ImpactConfig impact;
 };
 
 }  // namespace ear

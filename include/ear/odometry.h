@@ -77,6 +77,7 @@ struct Estimate {
 /// What was refused or bridged since the start; nothing is lost silently.
 struct InputCounts {
   std::uint64_t imu_rejected = 0;        ///< not finite, or not later than the sample before
+  std::uint64_t imu_spikes = 0;          ///< single samples far from both their neighbours, whose mean was taken
   std::uint64_t imu_gaps = 0;            ///< holes longer than FilterConfig::max_imu_gap
   std::uint64_t frames_rejected = 0;     ///< not later than the frame before, or images that do not fit the calibration
   std::uint64_t frames_without_imu = 0;  ///< no inertial samples reach the frame's time

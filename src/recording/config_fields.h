@@ -112,6 +112,14 @@ EnableFor<C, ContactConfig> visit(C& c, F&& f) {
 }
 
 template <typename C, typename F>
+EnableFor<C, ImpactConfig> visit(C& c, F&& f) {
+  f("accel_deviation", c.accel_deviation);
+  f("gyro_deviation", c.gyro_deviation);
+  f("accel_range", c.accel_range);
+  f("gyro_range", c.gyro_range);
+}
+
+template <typename C, typename F>
 EnableFor<C, FilterConfig> visit(C& c, F&& f) {
   f("window", c.window);
   f("max_track_updates", c.max_track_updates);
@@ -125,6 +133,7 @@ EnableFor<C, FilterConfig> visit(C& c, F&& f) {
   f("online_calibration", c.online_calibration);
   f("odometer", c.odometer);
   f("contact", c.contact);
+  f("impact", c.impact);
 }
 
 template <typename C, typename F>

@@ -163,3 +163,16 @@ TEST_CASE("wheels and lasers: a recording that begins in motion starts rolling, 
     CHECK(worst < 0.15);  // of 28 m, the first moments included
   }
 }
+
+TEST_CASE("wheels and lasers: spikes and clipped jolts of the IMU cost centimetres, not the track") {
+  for (const char* fault : {"imu_spikes@10", "imu_saturated@10"}) {
+    CAPTURE(std::string(fault));
+    simulator::Options options;
+    options.sequence = "flat1";
+    options.seed = 818;
+    options.duration = 30.0;
+    options.faults = {simulator::parse_fault(fault)};
+    const simulator::Simulation simulation(options);
+    CHECK(run(simulation, OdometerModel::terrain).position < 0.3);
+  }
+}

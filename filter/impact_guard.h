@@ -1,0 +1,54 @@
+// By how much an inertial sample is less certain than usual: a landing's strike, a spike, a clipped value.
+// docs/filter.md, section 9.
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+
+#include "ear/calibration.h"
+#include "ear/filter_config.h"
+#include "ear/types.h"
+
+namespace ear {
+
+/// Factors on the standard deviations of a sample's white noise, 1 or more.
+struct ImuNoiseFactors {
+  double gyro = 1.0;
+  double accel = 1.0;
+};
+
+/// Watches one sensor of three axes.
+class ExcessWatch {
+ public:
+  /// `range`: largest value of an axis, 0 if it is not known. `least`: a smaller deviation from the recent mean is none.
+  /// `memory` [s]: what recent means. All else in the sensor's unit.
+  ExcessWatch(double range, double least, double memory) : range_(range), least_(least), memory_(memory) {}
+
+  /// Standard deviation of what may be wrong with the value beyond the sensor's noise; 0 for an ordinary value.
+  double add(const Eigen::Vector3d& value, double dt);
+
+ private:
+  [[nodiscard]] bool clipped(const Eigen::Vector3d& value);
+
+  double range_, least_, memory_;
+  double clip_level_ = 0.0;  ///< where values were seen to be cut off, 0 if never
+  bool any_ = false;
+  Eigen::Vector3d last_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d mean_ = Eigen::Vector3d::Zero();
+  double variance_ = 0.0;  ///< of the distance from the mean
+};
+
+class ImpactGuard {
+ public:
+  ImpactGuard(const ImpactConfig& config, const ImuCalibration& imu);
+
+  /// Samples in time order, finite. Whoever integrates over the piece between two samples takes the larger factor.
+  ImuNoiseFactors add(const ImuSample& sample);
+
+ private:
+  ExcessWatch gyro_, accel_;
+  double gyro_sigma_, accel_sigma_;  ///< of a sample's white noise [rad/s], [m/s^2]
+  std::optional<TimeNs> last_ns_;
+};
+
+}  // namespace ear
