@@ -21,9 +21,9 @@ constexpr double kRollingWindow = 2.0;       // [s] of samples kept for a start 
 constexpr double kRollingStart = 1.5;        // [s] of them that it takes
 constexpr double kRollingVelocity = 0.5;     // [m/s] and share of the speed: before the samples of the window are used
 constexpr TimeNs kMissedReading = 50'000'000;  // [ns] without wheel readings: a displacement has a hole
-constexpr double kAccelSpike = 25.0;         // [m/s^2] of one sample from the mean of its neighbours
-constexpr double kGyroSpike = 2.0;           // [rad/s] the same
-constexpr double kSpikeRatio = 4.0;          // and so many times the difference of these
+constexpr double kAccelSpike = 25.0;           // [m/s^2] of one sample from the mean of its neighbours
+constexpr double kGyroSpike = 2.0;             // [rad/s] the same
+constexpr double kSpikeRatio = 4.0;            // and so many times the difference of these
 constexpr double kTooLate = 0.1;               // [s] behind the state: a reading that comes so late is not used
 constexpr double kWheelAge = 0.1;              // [s] older readings do not tell whether the wheels rest
 constexpr double kHeldSample = 0.02;           // [s] so far the newest IMU sample may stand in for one that is missing
@@ -161,8 +161,8 @@ void Filter::add_imu(const ImuSample& sample) {
   if (encoder_) note_contact(contact_.add_imu(sample));
 }
 
-/// One sample that is far from both its neighbours, which agree with each other, is a fault of the sensor or its bus: no
-/// strike lasts for one sample only. The mean of the neighbours takes its place.
+/// One sample that is far from both its neighbours, which agree with each other, is a fault of the sensor or its bus:
+/// no strike lasts for one sample only. The mean of the neighbours takes its place.
 void Filter::mend_spike(const ImuSample& next) {
   if (imu_.size() < 2) return;
   const ImuSample& before = imu_[imu_.size() - 2];

@@ -6,13 +6,13 @@
 namespace ear {
 namespace {
 
-constexpr double kSpread = 4.0;         // deviations from the mean, in standard deviations, are ordinary
-constexpr double kErrorShare = 0.1;     // of a deviation: bandwidth, scale and timing make that much of it wrong
-constexpr double kFull = 0.98;          // of the range or more is clipped
-constexpr double kFlat = 1e-3;          // relative: two extreme values as equal as this were cut off
-constexpr double kGyroMemory = 0.05;    // [s] bodies turn fast, but not suddenly
-constexpr double kAccelMemory = 0.2;    // [s]
-constexpr double kSpreadMemory = 2.5;   // times the memory of the mean
+constexpr double kSpread = 4.0;        // deviations from the mean, in standard deviations, are ordinary
+constexpr double kErrorShare = 0.1;    // of a deviation: bandwidth, scale and timing make that much of it wrong
+constexpr double kFull = 0.98;         // of the range or more is clipped
+constexpr double kFlat = 1e-3;         // relative: two extreme values as equal as this were cut off
+constexpr double kGyroMemory = 0.05;   // [s] bodies turn fast, but not suddenly
+constexpr double kAccelMemory = 0.2;   // [s]
+constexpr double kSpreadMemory = 2.5;  // times the memory of the mean
 
 }  // namespace
 
@@ -27,8 +27,8 @@ double ExcessWatch::add(const Eigen::Vector3d& value, double dt) {
   const bool cut_off = clipped(value);
   last_ = value;
 
-  // What is out of the ordinary counts as if it were at its limit: one strike does not move the mean, and a lasting change
-  // becomes the new mean.
+  // What is out of the ordinary counts as if it were at its limit: one strike does not move the mean, and a lasting
+  // change becomes the new mean.
   const double counted = std::min(distance, ordinary);
   const double share = 1.0 - std::exp(-dt / memory_);
   if (distance > 0.0) mean_ += share * counted / distance * deviation;

@@ -20,8 +20,8 @@ struct ImuNoiseFactors {
 /// Watches one sensor of three axes.
 class ExcessWatch {
  public:
-  /// `range`: largest value of an axis, 0 if it is not known. `least`: a smaller deviation from the recent mean is none.
-  /// `memory` [s]: what recent means. All else in the sensor's unit.
+  /// `range`: largest value of an axis, 0 if it is not known. `least`: a smaller deviation from the recent mean is
+  /// none. `memory` [s]: what recent means. All else in the sensor's unit.
   ExcessWatch(double range, double least, double memory) : range_(range), least_(least), memory_(memory) {}
 
   /// Standard deviation of what may be wrong with the value beyond the sensor's noise; 0 for an ordinary value.
