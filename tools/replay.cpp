@@ -15,7 +15,8 @@ class Replay {
         on_frame_(on_frame),
         before_sample_(before_sample),
         camera_offset_ns_(static_cast<TimeNs>(1e9 * recording.calibration().camera_time_offset)),
-        has_camera_(!recording.calibration().cameras.empty()) {}
+        has_camera_(!recording.calibration().cameras.empty()),
+        has_wheels_(recording.calibration().encoder.has_value()) {}
 
   void run() {
     while (const std::optional<Sample> sample = recording_.next()) {
@@ -45,8 +46,10 @@ class Replay {
     waiting_.reset();
   }
 
-  /// Without images the other sensors carry on: always on a vehicle without a camera, else while they are missing.
+  /// Without images the wheels carry on: always on a vehicle without a camera, else while images are missing. Without
+  /// wheels there is nothing but inertia, and its estimate would be no more than a plausible lie.
   void step_if_blind(TimeNs t_ns) {
+    if (!has_wheels_) return;
     if (has_camera_ && (!last_frame_ns_ || t_ns < *last_frame_ns_ + kPatience)) return;
     if (last_step_ns_ && t_ns < *last_step_ns_ + kStep) return;
     last_step_ns_ = t_ns;
@@ -59,6 +62,7 @@ class Replay {
   const std::function<void(const Sample&)>& before_sample_;
   TimeNs camera_offset_ns_;
   bool has_camera_;
+  bool has_wheels_;
   std::unique_ptr<RecordedFrame> waiting_;
   std::optional<TimeNs> last_frame_ns_;  // IMU time
   std::optional<TimeNs> last_step_ns_;
