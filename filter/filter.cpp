@@ -31,6 +31,7 @@ constexpr double kGapNoiseFactor = 10.0;       // on the noise densities while a
 constexpr double kStartGravityNoise = 0.02;    // [m/s^2] what idling rotors leave in the mean specific force
 constexpr double kKnownSigma = 1e-6;           // [m, rad] of position and yaw at the start: by definition zero
 constexpr double kUnknownTilt = 0.3;           // [rad] before gravity was measured
+constexpr double kCommonShare = 0.5;           // of its features, that the elder of a copy must have seen
 constexpr std::size_t kMinObservations = 2;    // clones that must have seen a feature
 
 int error_capacity(const FilterConfig& config) { return err::clone(config.window + 1); }
@@ -748,11 +749,13 @@ std::optional<std::size_t> Filter::clone_to_leave() const {
   return copy ? n - 2 : 0;
 }
 
-/// Median over the common features of how far they moved, the rotation taken out [px]; infinite without any.
+/// Median over the common features of how far they moved, the rotation taken out [px]. Infinite where they are few: a
+/// clone that most of today's features never saw is no elder of theirs, however little the vehicle moved.
 double Filter::median_parallax_px(const Clone& from, const Clone& to) const {
   const Eigen::Matrix3d R_C0B = state_.camera.T_BC0.R.transpose();
   const Eigen::Matrix3d R_to_from = R_C0B * to.T_WB.R.transpose() * from.T_WB.R * R_C0B.transpose();
   parallax_.clear();
+  std::size_t seen = 0;  // features in `to`
   for (const Track& track : tracks_) {
     const TrackObservation* a = nullptr;
     const TrackObservation* b = nullptr;
@@ -760,11 +763,14 @@ double Filter::median_parallax_px(const Clone& from, const Clone& to) const {
       if (o.frame == from.frame) a = &o;
       if (o.frame == to.frame) b = &o;
     }
+    seen += b != nullptr ? 1 : 0;
     if (a == nullptr || b == nullptr) continue;
     const Eigen::Vector3d turned = R_to_from * a->left.homogeneous();
     parallax_.push_back(focal_px_ * (b->left - turned.hnormalized()).norm());
   }
-  if (parallax_.empty()) return std::numeric_limits<double>::infinity();
+  if (static_cast<double>(parallax_.size()) < kCommonShare * static_cast<double>(seen) || parallax_.empty()) {
+    return std::numeric_limits<double>::infinity();
+  }
   const auto middle = parallax_.begin() + static_cast<std::ptrdiff_t>(parallax_.size() / 2);
   std::nth_element(parallax_.begin(), middle, parallax_.end());
   return *middle;

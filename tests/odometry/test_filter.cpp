@@ -118,6 +118,15 @@ TEST_CASE("filter: learns the calibration, and leaves it alone where it is froze
   CHECK(frozen.state().camera.time_offset == simulation.calibration().camera_time_offset);
 }
 
+TEST_CASE("filter: swaying in place it stays where it is, by camera and IMU alone") {
+  // The features of the first clones end long before the swaying does: the window must follow them.
+  const simulator::Simulation simulation = simulate("sway1", 36.0);
+  FilterConfig config;
+  config.odometer.model = OdometerModel::none;
+  Filter filter(config, simulation.calibration());
+  CHECK(largest_error(run_filter(filter, simulation)) < 0.03);
+}
+
 TEST_CASE("filter: turning on the spot does not push the translation out of the window") {
   // All frames at one place, turning: whatever their number, the clones before the turn are still there.
   const simulator::Simulation simulation = simulate("flat1", 12.0);
