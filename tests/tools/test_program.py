@@ -81,6 +81,8 @@ class EndToEnd(unittest.TestCase):
             self.assertGreater(figures["coverage"], 0.7)  # after about a second of standing
             self.assertGreater(figures["length_m"], 1.0)
             self.assertLess(figures["ate_rmse_m"], 0.02)
+            self.assertLess(figures["ground"]["z_rmse_m"], 0.02)
+            self.assertLess(figures["ground"]["slope_along"]["rmse_deg"], 2.0)
 
 
 if __name__ == "__main__":
