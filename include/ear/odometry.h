@@ -23,7 +23,7 @@ namespace ear {
 /// Where the estimator is in its life.
 enum class Status : std::uint8_t {
   waiting_for_imu,         ///< too few inertial samples yet
-  waiting_for_standstill,  ///< it starts from standing, and the vehicle moves
+  waiting_for_standstill,  ///< the vehicle moves, and has no wheels on the ground to start rolling with
   tracking
 };
 
