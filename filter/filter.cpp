@@ -741,12 +741,16 @@ bool Filter::add_track(const Track& track) {
 }
 
 /// With a full window, the clone before the newest goes if it shows little that its elder does not; else the oldest.
-/// Standing still or turning on the spot thus fills no window with copies.
+/// Turning on the spot thus fills no window with copies. Where all of the window shows one place, as while a vehicle
+/// shakes on its legs, there is nothing to keep, and the oldest goes: tracks are only used when they end or it leaves.
 std::optional<std::size_t> Filter::clone_to_leave() const {
   const std::size_t n = state_.clones.size();
   if (n <= static_cast<std::size_t>(config_.window)) return std::nullopt;
-  const bool copy = median_parallax_px(state_.clones[n - 3], state_.clones[n - 2]) < config_.keyframe_parallax_px;
-  return copy ? n - 2 : 0;
+  const auto same_place = [&](const Clone& a, const Clone& b) {
+    return median_parallax_px(a, b) < config_.keyframe_parallax_px;
+  };
+  const bool copy = same_place(state_.clones[n - 3], state_.clones[n - 2]);
+  return copy && !same_place(state_.clones.front(), state_.clones.back()) ? n - 2 : 0;
 }
 
 /// Median over the common features of how far they moved, the rotation taken out [px]. Infinite where they are few: a
