@@ -37,6 +37,7 @@ Nees run(const char* sequence, std::uint64_t seed, bool calibrate) {
   const simulator::Simulation simulation(options);
   FilterConfig config;
   config.feature_sigma_px = 1.05 * options.track.sigma_px;  // linearization costs a little
+  config.odometer.model = OdometerModel::none;  // its noise is that of real ground, not of the simulated one
   config.online_calibration.camera_extrinsics = calibrate;
   config.online_calibration.time_offset = calibrate;
   // The priors are the distribution that the simulator draws from: a fixed size in a random direction, per axis.
