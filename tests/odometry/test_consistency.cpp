@@ -19,8 +19,8 @@ constexpr int kRuns = 50;
 constexpr double kDuration = 60.0;  // [s]
 constexpr double kMoving =
     5.0;  // [s] from here on: the vehicle has left its start, where the pose is known by definition
-// The aim is 0.95. The mean over 50 runs is correlated in time, so that one draw of seeds may leave the band for a while
-// though the filter is consistent; docs/results.md states what is measured.
+// The aim is 0.95. The mean over 50 runs is correlated in time, so that one draw of seeds may leave the band for a
+// while though the filter is consistent; docs/results.md states what is measured.
 constexpr double kShare = 0.75;
 constexpr std::uint64_t kFirstSeed = 7001;  // not used in development
 
