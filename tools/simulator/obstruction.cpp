@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "tools/simulator/lens.h"
-
 namespace ear::simulator {
 namespace {
 
@@ -72,8 +70,8 @@ Obstruction::Veil Obstruction::veil(std::size_t camera, double t, const Eigen::V
   return veil;
 }
 
-void draw_obstruction(const Obstruction& obstruction, const CameraCalibration& calibration, std::size_t camera,
-                      double t, cv::Mat& grey) {
+void draw_obstruction(const Obstruction& obstruction, const PixelRays& rays, std::size_t camera, double t,
+                      cv::Mat& grey) {
   if (!obstruction.active(t)) return;
   if (obstruction.covered(t)) {
     grey.setTo(kCoverGrey);
@@ -81,7 +79,8 @@ void draw_obstruction(const Obstruction& obstruction, const CameraCalibration& c
   }
   for (int v = 0; v < grey.rows; ++v) {
     for (int u = 0; u < grey.cols; ++u) {
-      const Obstruction::Veil veil = obstruction.veil(camera, t, to_ray(calibration, Eigen::Vector2d(u, v)));
+      const std::size_t i = rays.index(u, v);
+      const Obstruction::Veil veil = obstruction.veil(camera, t, Eigen::Vector2f(rays.x[i], rays.y[i]).cast<double>());
       float& value = grey.at<float>(v, u);
       value += static_cast<float>(veil.opacity) * (static_cast<float>(veil.grey) - value);
     }

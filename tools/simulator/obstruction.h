@@ -7,8 +7,8 @@
 #include <optional>
 #include <vector>
 
-#include "ear/calibration.h"
 #include "tools/simulator/random.h"
+#include "tools/simulator/rays.h"
 #include "tools/simulator/sequence.h"
 
 namespace ear::simulator {
@@ -50,8 +50,8 @@ class Obstruction {
   std::vector<Blade> blades_;  // ordered by `begin`
 };
 
-/// Puts what is in the way into a picture, in grey levels (float).
-void draw_obstruction(const Obstruction& obstruction, const CameraCalibration& calibration, std::size_t camera,
-                      double t, cv::Mat& grey);
+/// Puts what is in the way into a picture, in grey levels (float). `rays` pass through the pixels' centres.
+void draw_obstruction(const Obstruction& obstruction, const PixelRays& rays, std::size_t camera, double t,
+                      cv::Mat& grey);
 
 }  // namespace ear::simulator

@@ -37,6 +37,7 @@ PictureMaker::PictureMaker(const Simulation& simulation)
   }
   for (const CameraCalibration& camera : simulation.true_calibration().cameras) {
     brightness_.push_back(vignetting(camera));
+    rays_.push_back(make_rays(camera, Eigen::Vector2d::Zero()));
   }
 }
 
@@ -60,7 +61,7 @@ cv::Mat PictureMaker::make(const Shot& shot) const {
       draw_passerby(passerby, people_[i], camera, trajectory, t, exposure, brightness_[source.camera], grey);
     }
   }
-  draw_obstruction(obstruction, camera, source.camera, t, grey);
+  draw_obstruction(obstruction, rays_[source.camera], source.camera, t, grey);
   grey *= light.gain;
   if (light.covered) grey.setTo(kCoverGrey);
   return sensor_.read(grey, picture_key(seed, taken_ns, source.camera));

@@ -8,6 +8,7 @@
 #include "tools/simulator/camera_faults.h"
 #include "tools/simulator/image_sensor.h"
 #include "tools/simulator/materials.h"
+#include "tools/simulator/rays.h"
 #include "tools/simulator/renderer.h"
 #include "tools/simulator/simulation.h"
 #include "tools/simulator/texture.h"
@@ -33,6 +34,7 @@ class PictureMaker {
   ImageSensor sensor_;
   std::vector<Texture> people_;      // one per passer-by
   std::vector<cv::Mat> brightness_;  // per camera
+  std::vector<PixelRays> rays_;      // per camera, through the pixels' centres
 };
 
 }  // namespace ear::simulator

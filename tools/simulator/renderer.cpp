@@ -1,12 +1,14 @@
 #include "tools/simulator/renderer.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <stdexcept>
+#include <string>
+#include <utility>
 
-#include "tools/simulator/lens.h"
+#include "tools/simulator/lanes.h"
 
 namespace ear::simulator {
 namespace {
@@ -15,217 +17,29 @@ namespace {
 // its height and of the exposure is met once. They lie symmetrically about the middle, so that a blurred point has its
 // middle where a sharp one would be. Offsets and instants must correlate then: every second pixel takes its offsets
 // negated, and the picture as a whole has no correlation.
+// Levels of detail are mixed by the sub-pictures: each rounds up from another fraction on. Opposite offsets share
+// theirs, or every second pixel would have its sharp sub-pictures on the other side.
 struct SubPicture {
   int right, down, late;
+  float rounding;
 };
 constexpr int kSubPictures = 5;
-constexpr std::array<SubPicture, kSubPictures> kPattern{{{-1, -2, 1}, {2, -1, 2}, {0, 0, 0}, {-2, 1, -2}, {1, 2, -1}}};
+constexpr std::array<SubPicture, kSubPictures> kPattern{
+    {{-1, -2, 1, 0.2F}, {2, -1, 2, 0.8F}, {0, 0, 0, 0.5F}, {-2, 1, -2, 0.8F}, {1, 2, -1, 0.2F}}};
 
 constexpr double fraction(int fifths) { return static_cast<double>(fifths) / kSubPictures; }
 
-constexpr int kTile = 16;           // [px]
-constexpr float kFlattest = 1e-3F;  // inverse depth [1/m] below which a plane counts as infinitely far
-
-// A pixel's footprint on a surface has two axes. Texture detail follows neither the longer one, or grazing surfaces
-// would blur, nor the shorter: the sub-pictures average along both.
-float wanted_detail(float minor, float major) { return std::max(0.6F * minor, major / 3.5F); }
-
-// A panel in the camera's frame. For the ray d = (x, y, 1): inverse depth w = m . d, place on the panel a = a0 + u . d
-// / w.
-struct PanelView {
-  Eigen::Vector3f m, u, v;
-  float a0 = 0.0F, b0 = 0.0F, width = 0.0F, height = 0.0F;
-  std::array<Eigen::Vector3f, 4> corners;
-  const Texture* texture = nullptr;
-};
-
-PanelView view_of(const Panel& panel, const Texture& texture, const Eigen::Isometry3d& T_WC) {
-  const Eigen::Matrix3d R_CW = T_WC.linear().transpose();
-  const Eigen::Vector3d& eye_W = T_WC.translation();
-  PanelView view;
-  view.m = (R_CW * panel.normal_W / (panel.offset - panel.normal_W.dot(eye_W))).cast<float>();
-  view.u = (R_CW * panel.u_W).cast<float>();
-  view.v = (R_CW * panel.v_W).cast<float>();
-  view.a0 = static_cast<float>(panel.u_W.dot(eye_W - panel.corner_W));
-  view.b0 = static_cast<float>(panel.v_W.dot(eye_W - panel.corner_W));
-  view.width = static_cast<float>(panel.width);
-  view.height = static_cast<float>(panel.height);
-  for (std::size_t i = 0; i < 4; ++i) {
-    const Eigen::Vector3d corner_W =
-        panel.corner_W + (i % 2 == 1 ? panel.width : 0.0) * panel.u_W + (i / 2 == 1 ? panel.height : 0.0) * panel.v_W;
-    view.corners[i] = (R_CW * (corner_W - eye_W)).cast<float>();
+// Of the rays of each tile, row by row.
+std::vector<RayBox> bounds(const PixelRays& rays) {
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  constexpr std::size_t kPixels = std::size_t{kTile} * kTile;
+  std::vector<RayBox> boxes(rays.x.size() / kPixels, {kInfinity, -kInfinity, kInfinity, -kInfinity});
+  for (std::size_t i = 0; i < rays.x.size(); ++i) {
+    RayBox& box = boxes[i / kPixels];
+    box = {std::min(box.min_x, rays.x[i]), std::max(box.max_x, rays.x[i]), std::min(box.min_y, rays.y[i]),
+           std::max(box.max_y, rays.y[i])};
   }
-  view.texture = &texture;
-  return view;
-}
-
-// Bounds of all rays of one tile.
-struct Box {
-  float min_x, max_x, min_y, max_y;
-};
-
-Box bounds(const std::vector<float>& x, const std::vector<float>& y, int width, int left, int top) {
-  Box box{std::numeric_limits<float>::infinity(), -std::numeric_limits<float>::infinity(),
-          std::numeric_limits<float>::infinity(), -std::numeric_limits<float>::infinity()};
-  for (int v = top; v < top + kTile; ++v) {
-    for (int u = left; u < left + kTile; ++u) {
-      const auto i = static_cast<std::size_t>(v * width + u);
-      box = {std::min(box.min_x, x[i]), std::max(box.max_x, x[i]), std::min(box.min_y, y[i]),
-             std::max(box.max_y, y[i])};
-    }
-  }
-  return box;
-}
-
-// Whether a panel may be seen through a box of rays: false when all its corners lie outside one side.
-bool may_meet(const PanelView& view, const Box& box) {
-  bool left = true, right = true, above = true, below = true, behind = true;
-  for (const Eigen::Vector3f& c : view.corners) {
-    left = left && c.x() < box.min_x * c.z();
-    right = right && c.x() > box.max_x * c.z();
-    above = above && c.y() < box.min_y * c.z();
-    below = below && c.y() > box.max_y * c.z();
-    behind = behind && c.z() <= 0.0F;
-  }
-  return !(left || right || above || below || behind);
-}
-
-// Level of detail with which a pixel of this focal length [px] sees the panel along the ray d.
-float detail_level(const PanelView& view, const Eigen::Vector3f& d, float focal) {
-  const float t = 1.0F / std::max(view.m.dot(d), kFlattest);
-  const float ud = view.u.dot(d) * t;
-  const float vd = view.v.dot(d) * t;
-  // Derivatives of the place with respect to x and y of the ray, and their singular values.
-  const float ax = (view.u.x() - view.m.x() * ud) * t;
-  const float ay = (view.u.y() - view.m.y() * ud) * t;
-  const float bx = (view.v.x() - view.m.x() * vd) * t;
-  const float by = (view.v.y() - view.m.y() * vd) * t;
-  const float squares = ax * ax + ay * ay + bx * bx + by * by;
-  const float area = std::abs(ax * by - ay * bx);
-  const float major = std::sqrt(0.5F * (squares + std::sqrt(std::max(0.0F, squares * squares - 4.0F * area * area))));
-  return view.texture->level_of(wanted_detail(area / major, major) / focal);
-}
-
-// What one tile sees of one panel.
-struct Candidate {
-  const PanelView* view = nullptr;
-  float nearest = -std::numeric_limits<float>::infinity();  // largest inverse depth of its plane over the tile [1/m]
-  float farthest = std::numeric_limits<float>::infinity();  // smallest
-  bool covers = true;                                       // all of the tile
-  std::array<float, 4> level{};                             // of detail, at the tile's corners
-};
-
-Candidate candidate_of(const PanelView& view, const Box& box, float focal) {
-  Candidate candidate;
-  candidate.view = &view;
-  for (std::size_t i = 0; i < 4; ++i) {
-    const Eigen::Vector3f d(i % 2 == 0 ? box.min_x : box.max_x, i / 2 == 0 ? box.min_y : box.max_y, 1.0F);
-    const float w = view.m.dot(d);
-    const float a = view.a0 + view.u.dot(d) / w;
-    const float b = view.b0 + view.v.dot(d) / w;
-    const bool inside = w > kFlattest && a >= 0.0F && b >= 0.0F && a <= view.width && b <= view.height;
-    candidate.covers = candidate.covers && inside;
-    candidate.nearest = std::max(candidate.nearest, w);
-    candidate.farthest = std::min(candidate.farthest, w);
-    candidate.level[i] = detail_level(view, d, focal);
-  }
-  return candidate;
-}
-
-// The panels that one tile may see, without those behind a panel that fills the tile.
-void find_candidates(const std::vector<PanelView>& views, const Box& box, float focal, std::vector<Candidate>& found) {
-  found.clear();
-  for (const PanelView& view : views) {
-    if (may_meet(view, box)) found.push_back(candidate_of(view, box, focal));
-  }
-  float wall = 0.0F;
-  for (const Candidate& candidate : found) {
-    if (candidate.covers) wall = std::max(wall, candidate.farthest);
-  }
-  const auto hidden = [wall](const Candidate& candidate) { return candidate.nearest < wall; };
-  found.erase(std::remove_if(found.begin(), found.end(), hidden), found.end());
-}
-
-// A row of pixels of one tile: their rays, and the nearest point found so far.
-struct Row {
-  std::array<float, kTile> x, y;
-  std::array<float, kTile> inverse_depth, a, b, level;  // place on the surface [m] and level of detail
-  std::array<const Texture*, kTile> texture;
-};
-
-// Level of detail at a pixel of the row, between those of the tile's corners.
-struct LevelRamp {
-  float at_left, per_x;
-};
-
-LevelRamp ramp(const Candidate& candidate, const Box& box, float y) {
-  const float f = (y - box.min_y) / (box.max_y - box.min_y);
-  const std::array<float, 4>& l = candidate.level;
-  const float left = l[0] + f * (l[2] - l[0]);
-  const float right = l[1] + f * (l[3] - l[1]);
-  return {left, (right - left) / (box.max_x - box.min_x)};
-}
-
-// Nothing but this panel in the whole tile: no comparisons.
-void see_only(const Candidate& candidate, const Box& box, Row& row) {
-  const PanelView& view = *candidate.view;
-  const LevelRamp level = ramp(candidate, box, row.y[0]);
-  for (std::size_t i = 0; i < kTile; ++i) {
-    const float x = row.x[i];
-    const float y = row.y[i];
-    const float depth = 1.0F / (view.m.x() * x + view.m.y() * y + view.m.z());
-    row.a[i] = view.a0 + depth * (view.u.x() * x + view.u.y() * y + view.u.z());
-    row.b[i] = view.b0 + depth * (view.v.x() * x + view.v.y() * y + view.v.z());
-    row.level[i] = level.at_left + level.per_x * (x - box.min_x);
-    row.inverse_depth[i] = 1.0F / depth;
-    row.texture[i] = view.texture;
-  }
-}
-
-void see_nearest(const Candidate& candidate, const Box& box, Row& row) {
-  const PanelView& view = *candidate.view;
-  const LevelRamp level = ramp(candidate, box, row.y[0]);
-  for (std::size_t i = 0; i < kTile; ++i) {
-    const float x = row.x[i];
-    const float y = row.y[i];
-    const float w = view.m.x() * x + view.m.y() * y + view.m.z();
-    if (w <= row.inverse_depth[i]) continue;
-    const float depth = 1.0F / w;
-    const float a = view.a0 + depth * (view.u.x() * x + view.u.y() * y + view.u.z());
-    const float b = view.b0 + depth * (view.v.x() * x + view.v.y() * y + view.v.z());
-    if (a < 0.0F || b < 0.0F || a > view.width || b > view.height) continue;
-    row.inverse_depth[i] = w;
-    row.a[i] = a;
-    row.b[i] = b;
-    row.level[i] = level.at_left + level.per_x * (x - box.min_x);
-    row.texture[i] = view.texture;
-  }
-}
-
-// Outdoors the ground's picture goes on beyond its border, as in a mirror: seamless, and itself again after two sizes.
-double mirrored(double place, double size) {
-  const double in_pair = place - 2.0 * size * std::floor(place / (2.0 * size));
-  return in_pair <= size ? in_pair : 2.0 * size - in_pair;
-}
-
-// A wavy ground, where it is nearer than what the row sees.
-void see_ground(const Scene& scene, const Texture& texture, const Eigen::Isometry3d& T_WC, float focal, Row& row) {
-  const Terrain& terrain = scene.terrain;
-  const Eigen::Vector2d& size = scene.size;
-  for (std::size_t i = 0; i < kTile; ++i) {
-    const Eigen::Vector3d toward_C(row.x[i], row.y[i], 1.0);
-    const double length = toward_C.norm();
-    const Eigen::Vector3d direction_W = T_WC.linear() * toward_C / length;
-    const auto range = terrain.cast(T_WC.translation(), direction_W, length / row.inverse_depth[i]);
-    if (!range) continue;
-    const Eigen::Vector3d p_W = T_WC.translation() + *range * direction_W;
-    const double facing = std::max(0.02, -terrain.normal(p_W.x(), p_W.y()).dot(direction_W));
-    const auto minor = static_cast<float>(*range / length);
-    row.a[i] = static_cast<float>(mirrored(p_W.x(), size.x()));
-    row.b[i] = static_cast<float>(mirrored(p_W.y(), size.y()));
-    row.level[i] = texture.level_of(wanted_detail(minor, minor / static_cast<float>(facing)) / focal);
-    row.texture[i] = &texture;
-  }
+  return boxes;
 }
 
 Panel flat_ground(const Scene& scene) {
@@ -233,20 +47,27 @@ Panel flat_ground(const Scene& scene) {
           scene.size.x(),          scene.size.y(),           Material::floor};
 }
 
-// All that may be seen from here, from its front.
-std::vector<PanelView> views_from(const Scene& scene, const Appearance& appearance, const Eigen::Isometry3d& T_WC) {
-  std::vector<PanelView> views;
-  for (std::size_t i = 0; i < scene.panels.size(); ++i) {
-    const Panel& panel = scene.panels[i];
-    if (panel.normal_W.dot(T_WC.translation()) > panel.offset) {
-      views.push_back(view_of(panel, appearance.panels[i], T_WC));
+// Distance from the eye to the farthest corner of any panel [m]: no ground beyond is seen.
+float farthest_corner(const Scene& scene, const Eigen::Vector3d& eye_W) {
+  constexpr double kFarthest = 100.0;
+  double farthest = 0.0;
+  for (const Panel& panel : scene.panels) {
+    for (const double a : {0.0, panel.width}) {
+      for (const double b : {0.0, panel.height}) {
+        farthest = std::max(farthest, (panel.corner_W + a * panel.u_W + b * panel.v_W - eye_W).norm());
+      }
     }
   }
-  if (scene.terrain.flat()) views.push_back(view_of(flat_ground(scene), appearance.ground, T_WC));
-  return views;
+  return static_cast<float>(scene.panels.empty() ? kFarthest : std::min(farthest, kFarthest));
 }
 
 }  // namespace
+
+struct Renderer::View {
+  std::vector<PanelView> panels;
+  std::optional<GroundView> ground;  // unless it is flat, and a panel
+  std::vector<PanelPart> parts;      // of one tile
+};
 
 Renderer::Renderer(const Scene& scene, const Appearance& appearance, const std::vector<CameraCalibration>& cameras)
     : scene_(scene), appearance_(appearance) {
@@ -254,23 +75,20 @@ Renderer::Renderer(const Scene& scene, const Appearance& appearance, const std::
     throw std::invalid_argument("the scene has " + std::to_string(scene.panels.size()) + " panels, its appearance " +
                                 std::to_string(appearance.panels.size()));
   }
+  for (const Texture& texture : appearance.panels) textures_.push_back(&texture);
+  textures_.push_back(&appearance.ground);
+
   for (const CameraCalibration& camera : cameras) {
     if (camera.width % kTile != 0 || camera.height % kTile != 0) {
       throw std::invalid_argument("pictures are rendered in tiles: width and height must be multiples of " +
                                   std::to_string(kTile));
     }
-    Eye eye{camera.T_BC, camera.width, camera.height, static_cast<float>(camera.fu), {}, simulator::vignetting(camera)};
+    Eye eye{camera.T_BC, camera.width,         camera.height,     static_cast<float>(camera.fu),
+            {},          make_lattice(camera), vignetting(camera)};
     for (const SubPicture& sub : kPattern) {
-      Rays rays;
-      for (int v = 0; v < camera.height; ++v) {
-        for (int u = 0; u < camera.width; ++u) {
-          const double side = (u + v) % 2 == 0 ? 1.0 : -1.0;
-          const Eigen::Vector2d ray = to_ray(camera, {u + side * fraction(sub.right), v + side * fraction(sub.down)});
-          rays.x.push_back(static_cast<float>(ray.x()));
-          rays.y.push_back(static_cast<float>(ray.y()));
-        }
-      }
-      eye.rays.push_back(std::move(rays));
+      PixelRays rays = make_rays(camera, {fraction(sub.right), fraction(sub.down)});
+      std::vector<RayBox> boxes = bounds(rays);
+      eye.patterns.push_back({std::move(rays), std::move(boxes)});
     }
     eyes_.push_back(std::move(eye));
   }
@@ -278,45 +96,96 @@ Renderer::Renderer(const Scene& scene, const Appearance& appearance, const std::
 
 cv::Mat Renderer::render(std::size_t camera, const Trajectory& trajectory, double t, const Exposure& exposure) const {
   const Eye& eye = eyes_.at(camera);
-  cv::Mat sum = cv::Mat::zeros(eye.height, eye.width, CV_32FC1);
+  std::vector<View> views;
   for (std::size_t sub = 0; sub < kPattern.size(); ++sub) {
     const Kinematics motion = trajectory.at(t + fraction(kPattern[sub].late) * exposure.seconds);
     Eigen::Isometry3d T_WB = Eigen::Isometry3d::Identity();
     T_WB.linear() = motion.R_WB;
     T_WB.translation() = motion.p_WB;
-    add_sub_picture(eye, T_WB * eye.T_BC, sub, sum);
+    views.push_back(look(eye, T_WB * eye.T_BC, sub));
   }
-  return sum.mul(eye.vignetting, exposure.gain / kSubPictures);
+
+  const auto gain = static_cast<float>(exposure.gain / kSubPictures);
+  cv::Mat picture(eye.height, eye.width, CV_32FC1);
+  TileSum sum;
+  for (int top = eye.height - kTile; top >= 0; top -= kTile) {  // from below, as GroundView wants it
+    for (int left = 0; left < eye.width; left += kTile) {
+      // All sub-pictures of a tile, while their textures are in the processor's cache.
+      sum.fill(0.0F);
+      for (std::size_t sub = 0; sub < kPattern.size(); ++sub) add_tile(eye, views[sub], sub, left, top, sum);
+      for (int row = 0; row < kTile; ++row) {
+        const float* in = sum.data() + row * kTile;
+        const float* bright = eye.vignetting.ptr<float>(top + row) + left;
+        float* out = picture.ptr<float>(top + row) + left;
+        for (int i = 0; i < kTile; ++i) out[i] = gain * bright[i] * in[i];
+      }
+    }
+  }
+  return picture;
 }
 
-void Renderer::add_sub_picture(const Eye& eye, const Eigen::Isometry3d& T_WC, std::size_t sub, cv::Mat& sum) const {
-  const std::vector<PanelView> views = views_from(scene_, appearance_, T_WC);
-  // Levels of detail are mixed by the sub-pictures: each rounds at another threshold.
-  const auto threshold = static_cast<float>((static_cast<double>(sub) + 0.5) / kSubPictures);
-  const Rays& rays = eye.rays[sub];
-  std::vector<Candidate> candidates;
-  for (int top = 0; top < eye.height; top += kTile) {
-    for (int left = 0; left < eye.width; left += kTile) {
-      const Box box = bounds(rays.x, rays.y, eye.width, left, top);
-      find_candidates(views, box, eye.focal, candidates);
-      for (int v = top; v < top + kTile; ++v) {
-        Row row;
-        const auto first = static_cast<std::ptrdiff_t>(v * eye.width + left);
-        std::copy_n(rays.x.begin() + first, kTile, row.x.begin());
-        std::copy_n(rays.y.begin() + first, kTile, row.y.begin());
-        if (candidates.size() == 1 && candidates.front().covers) {
-          see_only(candidates.front(), box, row);
-        } else {
-          row.inverse_depth.fill(kFlattest);
-          row.texture.fill(nullptr);
-          for (const Candidate& candidate : candidates) see_nearest(candidate, box, row);
-        }
-        if (!scene_.terrain.flat()) see_ground(scene_, appearance_.ground, T_WC, eye.focal, row);
-        float* out = sum.ptr<float>(v) + left;
-        for (std::size_t i = 0; i < kTile; ++i) {
-          if (row.texture[i] != nullptr) out[i] += row.texture[i]->at(row.a[i], row.b[i], row.level[i] + threshold);
-        }
-      }
+Renderer::View Renderer::look(const Eye& eye, const Eigen::Isometry3d& T_WC, std::size_t sub) const {
+  View view;
+  for (std::size_t i = 0; i < scene_.panels.size(); ++i) {
+    const Panel& panel = scene_.panels[i];
+    const bool from_its_front = panel.normal_W.dot(T_WC.translation()) > panel.offset;
+    if (from_its_front) view.panels.push_back(view_of(panel, static_cast<int>(i), appearance_.panels[i], T_WC));
+  }
+  const auto ground = static_cast<int>(scene_.panels.size());
+  if (scene_.terrain.flat()) {
+    view.panels.push_back(view_of(flat_ground(scene_), ground, appearance_.ground, T_WC));
+  } else {
+    view.ground.emplace(GroundView::Ground{scene_.terrain, scene_.size, appearance_.ground.pixels_per_metre(), ground,
+                                           farthest_corner(scene_, T_WC.translation())},
+                        GroundView::Optics{eye.lattice, eye.patterns[sub].rays, eye.width, eye.height,
+                                           static_cast<float>(fraction(kPattern[sub].right)),
+                                           static_cast<float>(fraction(kPattern[sub].down)), eye.focal},
+                        T_WC);
+  }
+  return view;
+}
+
+void Renderer::add_tile(const Eye& eye, View& view, std::size_t sub, int left, int top, TileSum& sum) const {
+  const Pattern& pattern = eye.patterns[sub];
+  const RayBox& box = pattern.boxes[static_cast<std::size_t>(top / kTile * (eye.width / kTile) + left / kTile)];
+  const float wall = view.ground ? view.ground->farthest_in(left, top) : 0.0F;
+  find_panels(view.panels, box, eye.focal, wall, view.parts);
+  const bool one_panel = view.parts.size() == 1 && view.parts.front().covers;
+  Row row;
+  for (int v = top + kTile - 1; v >= top; --v) {
+    const std::size_t first = pattern.rays.index(left, v);
+    row.x = pattern.rays.x.data() + first;
+    row.y = pattern.rays.y.data() + first;
+    if (one_panel) {
+      see_only(view.parts.front(), box, row);
+    } else {
+      row.clear();
+      for (const PanelPart& part : view.parts) see_nearest(part, box, row);
+    }
+    if (view.ground) view.ground->see(left, v, row);
+    shade(row, kPattern[sub].rounding, sum.data() + (v - top) * kTile);
+  }
+}
+
+void Renderer::shade(const Row& row, float rounding, float* sum) const {
+  for (std::size_t first = 0; first < kTile; first += kLanes) {
+    // Mostly all of one surface, and of one level.
+    const int surface = row.surface[first];
+    const Texture* texture = surface == kNothing ? nullptr : textures_[static_cast<std::size_t>(surface)];
+    const int level = texture == nullptr ? 0 : texture->whole(row.level[first] + rounding);
+    bool alike = texture != nullptr;
+    for (std::size_t i = first; i < first + kLanes && alike; ++i) {
+      alike = row.surface[i] == surface && texture->whole(row.level[i] + rounding) == level;
+    }
+    if (alike) {
+      Eigen::Map<Lanes>(sum + first) += texture->at(Eigen::Map<const Lanes>(row.a.data() + first),
+                                                    Eigen::Map<const Lanes>(row.b.data() + first), level);
+      continue;
+    }
+    for (std::size_t i = first; i < first + kLanes; ++i) {
+      if (row.surface[i] == kNothing) continue;
+      const Texture& own = *textures_[static_cast<std::size_t>(row.surface[i])];
+      sum[i] += own.at(row.a[i], row.b[i], row.level[i] + rounding);
     }
   }
 }

@@ -3,14 +3,19 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
-#include <cstdint>
+#include <array>
+#include <cstddef>
 #include <opencv2/core.hpp>
 #include <vector>
 
 #include "ear/calibration.h"
+#include "tools/simulator/ground_view.h"
 #include "tools/simulator/image_sensor.h"
 #include "tools/simulator/materials.h"
+#include "tools/simulator/panel_view.h"
+#include "tools/simulator/rays.h"
 #include "tools/simulator/scene.h"
+#include "tools/simulator/tile.h"
 #include "tools/simulator/trajectory.h"
 
 namespace ear::simulator {
@@ -28,22 +33,30 @@ class Renderer {
                                const Exposure& exposure) const;
 
  private:
-  // One ray (x, y, 1) per pixel, in the camera's frame, row by row.
-  struct Rays {
-    std::vector<float> x, y;
+  // What is known of a sub-picture before any motion.
+  struct Pattern {
+    PixelRays rays;
+    std::vector<RayBox> boxes;  // per tile, row by row
   };
   struct Eye {
     Eigen::Isometry3d T_BC;
     int width = 0, height = 0;
-    float focal = 0.0F;      // [px]
-    std::vector<Rays> rays;  // per sub-picture
+    float focal = 0.0F;  // [px]
+    std::vector<Pattern> patterns;
+    Lattice lattice;
     cv::Mat vignetting;
   };
+  // What is before the camera at the instant of a sub-picture.
+  struct View;
+  using TileSum = std::array<float, static_cast<std::size_t>(kTile* kTile)>;
 
-  void add_sub_picture(const Eye& eye, const Eigen::Isometry3d& T_WC, std::size_t sub, cv::Mat& sum) const;
+  [[nodiscard]] View look(const Eye& eye, const Eigen::Isometry3d& T_WC, std::size_t sub) const;
+  void add_tile(const Eye& eye, View& view, std::size_t sub, int left, int top, TileSum& sum) const;
+  void shade(const Row& row, float threshold, float* sum) const;
 
   const Scene& scene_;
   const Appearance& appearance_;
+  std::vector<const Texture*> textures_;  // by Row::surface: the panels', the ground's
   std::vector<Eye> eyes_;
 };
 

@@ -22,6 +22,7 @@ class Terrain {
   explicit Terrain(std::vector<GroundWave> waves);
 
   [[nodiscard]] bool flat() const { return waves_.empty(); }
+  [[nodiscard]] const std::vector<GroundWave>& waves() const { return waves_; }
   /// h(x, y) [m].
   [[nodiscard]] double height(double x, double y) const;
   /// (dh/dx, dh/dy).
