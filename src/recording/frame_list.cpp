@@ -19,6 +19,10 @@ std::filesystem::path csv_of(const std::filesystem::path& mav0, const char* came
 FrameList::FrameList(const std::filesystem::path& mav0, bool stereo, double camera_rate_hz)
     : mav0_(mav0), left_(csv_of(mav0, "cam0"), "cam0", parse_image_row), camera_rate_hz_(camera_rate_hz) {
   if (stereo) right_ = std::make_unique<SampleStream<ImageRow>>(csv_of(mav0, "cam1"), "cam1", parse_image_row);
+  const std::filesystem::path arrivals = mav0 / "cam0" / "arrival.csv";
+  if (std::filesystem::exists(arrivals)) {
+    arrivals_ = std::make_unique<SampleStream<ArrivalRow>>(arrivals, "cam0 arrival", parse_arrival_row);
+  }
 }
 
 std::optional<FrameFiles> FrameList::next(Warnings& warnings) {
@@ -31,7 +35,7 @@ std::optional<FrameFiles> FrameList::next(Warnings& warnings) {
 std::optional<FrameFiles> FrameList::next_pair(Warnings& warnings) {
   const std::optional<ImageRow> left = left_.next(warnings);
   if (!left) return std::nullopt;
-  FrameFiles frame{left->t_ns, mav0_ / "cam0" / "data" / left->filename, {}};
+  FrameFiles frame{left->t_ns, arrival_of(left->t_ns, warnings), mav0_ / "cam0" / "data" / left->filename, {}};
   if (right_) frame.right = matching_right(left->t_ns, warnings);
   return frame;
 }
@@ -51,6 +55,18 @@ std::filesystem::path FrameList::matching_right(TimeNs t_ns, Warnings& warnings)
   std::filesystem::path file = mav0_ / "cam1" / "data" / right_ahead_->filename;
   right_ahead_.reset();
   return file;
+}
+
+TimeNs FrameList::arrival_of(TimeNs t_ns, Warnings& warnings) {
+  if (!arrivals_) return t_ns;
+  while (!arrival_ahead_ || arrival_ahead_->t_ns < t_ns) {
+    arrival_ahead_ = arrivals_->next(warnings);
+    if (!arrival_ahead_) {
+      arrivals_.reset();
+      return t_ns;
+    }
+  }
+  return arrival_ahead_->t_ns == t_ns ? arrival_ahead_->arrival_ns : t_ns;
 }
 
 // Time is cut into slots of one wanted period, and the frame nearest to the beginning of each slot is used: half an

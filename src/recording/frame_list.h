@@ -15,6 +15,7 @@ namespace ear {
 /// The image files of one instant.
 struct FrameFiles {
   TimeNs t_ns = 0;
+  TimeNs arrival_ns = 0;  ///< the stamp, unless cam0/arrival.csv says otherwise
   std::filesystem::path left;
   std::filesystem::path right;  ///< empty: no right image at this time
 };
@@ -32,12 +33,15 @@ class FrameList {
  private:
   [[nodiscard]] std::optional<FrameFiles> next_pair(Warnings& warnings);
   [[nodiscard]] std::filesystem::path matching_right(TimeNs t_ns, Warnings& warnings);
+  [[nodiscard]] TimeNs arrival_of(TimeNs t_ns, Warnings& warnings);
   [[nodiscard]] bool due(TimeNs t_ns);
 
   std::filesystem::path mav0_;
   SampleStream<ImageRow> left_;
   std::unique_ptr<SampleStream<ImageRow>> right_;
   std::optional<ImageRow> right_ahead_;
+  std::unique_ptr<SampleStream<ArrivalRow>> arrivals_;
+  std::optional<ArrivalRow> arrival_ahead_;
   double camera_rate_hz_;
   std::optional<TimeNs> first_ns_;
   std::optional<TimeNs> last_ns_;

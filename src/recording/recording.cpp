@@ -21,10 +21,11 @@ ImageView view_of(const cv::Mat& image) {
   return {image.data, image.cols, image.rows, static_cast<std::ptrdiff_t>(image.step[0])};
 }
 
-RecordedFrame make_frame(TimeNs t_ns, std::array<cv::Mat, 2> images) {
+RecordedFrame make_frame(const FrameFiles& files, std::array<cv::Mat, 2> images) {
   auto pixels = std::make_shared<const std::array<cv::Mat, 2>>(std::move(images));
   RecordedFrame frame;
-  frame.t_ns = t_ns;
+  frame.t_ns = files.t_ns;
+  frame.arrival_ns = files.arrival_ns;
   frame.left = view_of((*pixels)[0]);
   frame.right = view_of((*pixels)[1]);
   frame.pixels = std::move(pixels);
@@ -48,7 +49,7 @@ class FrameDecoder {
       std::array<cv::Mat, 2> images{read(files->left, 0, decoded.warnings), {}};
       if (!files->right.empty()) images[1] = read(files->right, 1, decoded.warnings);
       if (images[0].empty()) continue;
-      decoded.frame = make_frame(files->t_ns, std::move(images));
+      decoded.frame = make_frame(*files, std::move(images));
       break;
     }
     return decoded;
@@ -119,8 +120,9 @@ class Recording::Impl {
 
   std::optional<Sample> next() {
     // In the order of precedence at equal times: a later one must be strictly earlier.
-    const std::array<std::optional<TimeNs>, 4> times{stamp(next_imu_), stamp(next_encoder_), stamp(next_laser_),
-                                                     stamp(next_frame_)};
+    const std::array<std::optional<TimeNs>, 4> times{
+        stamp(next_imu_), stamp(next_encoder_), stamp(next_laser_),
+        next_frame_ ? std::optional(next_frame_->arrival_ns) : std::nullopt};
     std::size_t earliest = 0;
     for (std::size_t i = 1; i < times.size(); ++i) {
       if (times[i] && (!times[earliest] || *times[i] < *times[earliest])) earliest = i;

@@ -54,7 +54,8 @@ class Recording {
   /// The sensors that are read: no more cameras than have images and are wanted.
   [[nodiscard]] const Calibration& calibration() const;
 
-  /// The next sample of all sensors in time order; of equal times IMU, encoder, laser, images. Nothing at the end.
+  /// The next sample of all sensors in time order, late frames by their arrival; of equal times IMU, encoder, laser,
+  /// images. Nothing at the end.
   /// Throws InputError.
   [[nodiscard]] std::optional<Sample> next();
 

@@ -88,4 +88,11 @@ ImageRow parse_image_row(const CsvRow& row) {
   return {t_ns, std::string(row.fields[1])};
 }
 
+ArrivalRow parse_arrival_row(const CsvRow& row) {
+  require_columns(row, 2);
+  const auto arrival_ns = parse_integer(row.fields[1]);
+  if (!arrival_ns) malformed("arrival", row.fields[1], "a whole number of nanoseconds");
+  return {stamp(row), *arrival_ns};
+}
+
 }  // namespace ear

@@ -15,6 +15,12 @@ struct ImageRow {
   std::string filename;  ///< inside the camera's data folder
 };
 
+/// One row of a camera's arrival.csv.
+struct ArrivalRow {
+  TimeNs t_ns = 0;  ///< the frame's stamp
+  TimeNs arrival_ns = 0;
+};
+
 /// timestamp [ns], w_x, w_y, w_z [rad/s], a_x, a_y, a_z [m/s^2]. Throws RowError.
 [[nodiscard]] ImuSample parse_imu_row(const CsvRow& row);
 
@@ -26,5 +32,8 @@ struct ImageRow {
 
 /// timestamp [ns], file name. Throws RowError.
 [[nodiscard]] ImageRow parse_image_row(const CsvRow& row);
+
+/// timestamp [ns], arrival [ns]. Throws RowError.
+[[nodiscard]] ArrivalRow parse_arrival_row(const CsvRow& row);
 
 }  // namespace ear

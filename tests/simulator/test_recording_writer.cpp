@@ -194,6 +194,34 @@ TEST_CASE("recording: pictures do not depend on the threads, and serve the other
                        std::runtime_error);
 }
 
+TEST_CASE("recording: late frames are read when they arrive") {
+  const TemporaryFolder folder;
+  Options options = short_drive(49);
+  options.duration = 0.6;
+  options.faults = {parse_fault("camera_late@0.2+0.1=0.15")};
+  const Simulation simulation(options);
+  write_recording(simulation, folder / "r");
+  // Frames at 0.11, 0.21 (arrives at 0.37), 0.31 (behind it), 0.41, 0.51, 0.61 s.
+  CHECK(lines_of(folder / "r/mav0/cam0/arrival.csv").size() == 3);
+  render_images(simulation, all_pictures(simulation), folder / "r", 2, no_progress);
+  ear::Recording recording(folder / "r");
+  TimeNs imu_ns = 0;
+  std::size_t frames = 0;
+  while (const auto sample = recording.next()) {
+    if (const auto* s = std::get_if<ear::ImuSample>(&*sample)) imu_ns = s->t_ns;
+    const auto* frame = std::get_if<ear::RecordedFrame>(&*sample);
+    if (frame == nullptr) continue;
+    const Frame& expected = simulation.frames().at(frames++);
+    CHECK(frame->t_ns == expected.t_ns);
+    const bool late = expected.arrival_ns > expected.taken_ns + kFrameDelay;
+    CHECK(late == (frames == 2 || frames == 3));
+    CHECK(frame->arrival_ns == (late ? expected.arrival_ns : expected.t_ns));
+    CHECK(std::abs(ear::seconds_between(frame->arrival_ns, imu_ns)) < 0.006);
+  }
+  CHECK(frames == 6);
+  CHECK_FALSE(fs::exists(folder / "r/mav0/cam1/arrival.csv"));
+}
+
 TEST_CASE("recording: a faulty one takes from a clean one all pictures that are the same") {
   const TemporaryFolder folder;
   Options options = short_drive(48);

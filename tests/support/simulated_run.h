@@ -38,15 +38,17 @@ inline std::vector<EvaluatedEstimate> run_filter(Filter& filter, const simulator
                                                  const experiments::ChangeFrame& change = {}) {
   std::vector<EvaluatedEstimate> result;
   std::optional<WorldAlignment> world;
-  const std::vector<TimeNs>& times = simulation.frame_times();
-  const auto compare = [&](std::size_t frame, const Estimate& estimate) {
+  const TimeNs first_ns = simulation.frame_times().front();
+  const auto compare = [&](TimeNs stamp_ns, const Estimate& estimate) {
     const NavState& x = estimate.state;
     const simulator::Truth truth = simulation.truth(x.t_ns);
     if (!world) world.emplace(x, truth);
-    result.push_back({seconds_between(times.front(), times[frame]), estimate, world->R * truth.p_WB + world->p - x.p_WB,
+    result.push_back({seconds_between(first_ns, stamp_ns), estimate, world->R * truth.p_WB + world->p - x.p_WB,
                       log_so3(world->R * truth.R_WB * x.q_WB.toRotationMatrix().transpose())});
   };
-  experiments::replay(simulation, filter, compare, change);
+  experiments::ReplayOptions options;
+  options.change = change;
+  experiments::replay(simulation, filter, compare, options);
   return result;
 }
 

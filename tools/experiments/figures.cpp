@@ -72,6 +72,7 @@ void take_terrain(const evaluation::TerrainFigures& terrain, Figures& figures) {
 }
 
 void take_errors(const evaluation::Evaluation& evaluation, Figures& figures) {
+  figures.coverage = 100.0 * evaluation.coverage;
   figures.length = evaluation.length;
   figures.ate_rmse = evaluation.position_rmse;
   if (evaluation.position_ratio) figures.ate_percent = 100.0 * *evaluation.position_ratio;
@@ -88,18 +89,16 @@ Figures measure(const simulator::Simulation& simulation, const Calibration& cali
                 evaluation::AlignmentKind alignment) {
   Filter filter(config, calibration);
   Record record;
-  const auto add = [&](std::size_t, const Estimate& estimate) { record.add(estimate); };
-  if (calibration.cameras.empty()) {
-    replay_without_camera(simulation, filter, add);
-  } else {
-    replay(simulation, filter, add);
-  }
+  ReplayOptions options;
+  options.camera = !calibration.cameras.empty();
+  options.wheels = calibration.encoder && config.odometer.model != OdometerModel::none;
+  replay(
+      simulation, filter, [&](TimeNs, const Estimate& estimate) { record.add(estimate); }, options);
   if (config.odometer.model == OdometerModel::none) record.estimate.terrain.clear();  // it was not asked
 
   Figures figures;
   const evaluation::Estimate& estimate = record.estimate;
-  figures.coverage =
-      100.0 * static_cast<double>(estimate.poses.size()) / static_cast<double>(simulation.frame_times().size());
+  figures.coverage = 0.0;
   if (!record.finite || estimate.poses.size() < 2) return figures;
 
   std::vector<TimeNs> times;

@@ -1,34 +1,30 @@
 #include "tools/experiments/replay_simulation.h"
 
+#include <optional>
+
+#include "tools/blind_steps.h"
 #include "tools/experiments/sample_feed.h"
 
 namespace ear::experiments {
-namespace {
-
-/// `process` takes a frame's index to the estimate after it.
-void feed_all(const simulator::Simulation& simulation, Filter& filter, const OnEstimate& on_estimate,
-              const std::function<std::optional<Estimate>(std::size_t)>& process) {
-  SampleFeed feed(simulation);
-  for (std::size_t i = 0; i < simulation.frame_times().size(); ++i) {
-    feed.until_frame(simulation.frame_times()[i], filter);
-    if (const std::optional<Estimate> estimate = process(i)) on_estimate(i, *estimate);
-  }
-}
-
-}  // namespace
 
 void replay(const simulator::Simulation& simulation, Filter& filter, const OnEstimate& on_estimate,
-            const ChangeFrame& change) {
-  feed_all(simulation, filter, on_estimate, [&](std::size_t i) {
-    FeatureFrame frame = simulation.tracks(i);
-    if (change) change(frame);
-    return filter.process(frame);
-  });
-}
-
-void replay_without_camera(const simulator::Simulation& simulation, Filter& filter, const OnEstimate& on_estimate) {
-  feed_all(simulation, filter, on_estimate,
-           [&](std::size_t i) { return filter.process_without_image(simulation.frame_times()[i]); });
+            const ReplayOptions& options) {
+  tools::BlindSteps steps(options.camera, options.wheels);
+  const auto estimate = [&](TimeNs stamp_ns, const std::optional<Estimate>& result) {
+    if (result) on_estimate(stamp_ns, *result);
+  };
+  for (const simulator::Delivery& delivery : simulation.deliveries()) {
+    hand_over(simulation, delivery, filter);
+    if (delivery.stream == simulator::SensorStream::camera && options.camera) {
+      FeatureFrame frame = simulation.tracks(delivery.index);
+      if (options.change) options.change(frame);
+      steps.saw_frame(delivery.arrival_ns);
+      estimate(frame.t_ns, filter.process(frame));
+    } else if (delivery.stream == simulator::SensorStream::imu && steps.due(delivery.arrival_ns)) {
+      const TimeNs stamp_ns = filter.camera_time(simulation.imu()[delivery.index].t_ns);
+      estimate(stamp_ns, filter.process_without_image(stamp_ns));
+    }
+  }
 }
 
 }  // namespace ear::experiments

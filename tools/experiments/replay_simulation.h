@@ -1,7 +1,6 @@
 // A filter on a simulation's samples and feature tracks: how every experiment and every test runs one.
 #pragma once
 
-#include <cstddef>
 #include <functional>
 
 #include "filter/filter.h"
@@ -12,14 +11,17 @@ namespace ear::experiments {
 /// May alter a frame's features before the filter gets them.
 using ChangeFrame = std::function<void(FeatureFrame&)>;
 
-/// Is given the estimate after each frame that has one, and the frame's index in Simulation::frame_times().
-using OnEstimate = std::function<void(std::size_t frame, const Estimate& estimate)>;
+/// Is given every estimate, and the time that it was asked for: a frame's stamp, or the stamp that a frame would have.
+using OnEstimate = std::function<void(TimeNs stamp_ns, const Estimate& estimate)>;
 
-/// Feeds all samples and frames in the order of their arrival.
+struct ReplayOptions {
+  ChangeFrame change = {};
+  bool camera = true;  ///< false: no frame is handed over
+  bool wheels = true;  ///< false: no steps while frames are missing (tools/blind_steps.h)
+};
+
+/// Feeds all samples and frames in the order of their arrival, as `ear run` does.
 void replay(const simulator::Simulation& simulation, Filter& filter, const OnEstimate& on_estimate,
-            const ChangeFrame& change = {});
-
-/// Feeds the samples of all other sensors, and asks for an estimate where a frame would be.
-void replay_without_camera(const simulator::Simulation& simulation, Filter& filter, const OnEstimate& on_estimate);
+            const ReplayOptions& options = {});
 
 }  // namespace ear::experiments

@@ -7,15 +7,9 @@
 #include "tools/simulator/sensors.h"
 
 namespace ear::simulator {
-namespace {
-
-constexpr TimeNs kReadOut = 10'000'000;  // from the middle of the exposure to the frame at hand
-
-}  // namespace
-
 std::vector<Frame> deliver(const std::vector<TimeNs>& exposures, const std::vector<Fault>& faults, std::uint64_t seed) {
   std::vector<char> dropped(exposures.size(), 0);
-  std::vector<TimeNs> delay(exposures.size(), kReadOut);
+  std::vector<TimeNs> delay(exposures.size(), kFrameDelay);
   for (const Fault& fault : faults) {
     Rng rng = fault_rng(fault, seed);
     bool first = true;

@@ -11,11 +11,14 @@
 
 namespace ear::simulator {
 
+/// So much after the middle of its exposure a frame is there, if it is not late: exposed, read out, tracked [ns].
+inline constexpr TimeNs kFrameDelay = 10'000'000;
+
 /// One stereo frame as it is delivered.
 struct Frame {
   TimeNs t_ns = 0;           ///< its stamp
   TimeNs taken_ns = 0;       ///< the middle of its exposure: the same, unless the camera's clock jumps
-  TimeNs arrival_ns = 0;     ///< when it reaches the estimator, in true time: 10 ms later, unless it is late
+  TimeNs arrival_ns = 0;     ///< when it reaches the estimator, in true time
   std::size_t exposure = 0;  ///< counts all frames, also those that do not arrive
 };
 

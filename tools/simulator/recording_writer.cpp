@@ -1,6 +1,7 @@
 #include "tools/simulator/recording_writer.h"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <cstdarg>
 #include <cstdio>
@@ -79,6 +80,19 @@ void write_camera(const Simulation& simulation, const fs::path& folder, std::siz
   csv.print("#timestamp [ns],filename\n");
   for (const Frame& frame : simulation.frames()) {
     csv.print("%lld,%lld.png\n", number(frame.t_ns), number(frame.taken_ns));
+  }
+  csv.close();
+}
+
+// Frames that arrive later than they usually do.
+void write_arrivals(const Simulation& simulation, const fs::path& file) {
+  const auto late = [](const Frame& frame) { return frame.arrival_ns > frame.taken_ns + kFrameDelay; };
+  const std::vector<Frame>& frames = simulation.frames();
+  if (std::none_of(frames.begin(), frames.end(), late)) return;
+  TextFile csv(file);
+  csv.print("#timestamp [ns],arrival [ns]\n");
+  for (const Frame& frame : frames) {
+    if (late(frame)) csv.print("%lld,%lld\n", number(frame.t_ns), number(frame.arrival_ns));
   }
   csv.close();
 }
@@ -208,6 +222,7 @@ void write_recording(const Simulation& simulation, const fs::path& directory) {
   for (std::size_t i = 0; i < simulation.calibration().cameras.size(); ++i) {
     write_camera(simulation, mav0 / ("cam" + std::to_string(i)), i);
   }
+  write_arrivals(simulation, mav0 / "cam0" / "arrival.csv");
   write_imu(simulation, mav0 / "imu0");
   write_encoder(simulation, mav0 / "encoder0");
   write_lasers(simulation, mav0 / "laser0");

@@ -57,8 +57,10 @@ std::shared_ptr<const MotionPlan> planned(const Options& options, const Sequence
   for (const HardLanding& landing : hard_landings) {
     const auto within = [&landing](double t) { return landing.begin <= t && t < landing.end; };
     if (std::none_of(plan->touchdowns.begin(), plan->touchdowns.end(), within)) {
-      throw std::invalid_argument("fault 'hard_landing': nothing lands within " + std::to_string(landing.begin) +
-                                  " to " + std::to_string(landing.end) + " s");
+      std::string message = "fault 'hard_landing': nothing lands within " + std::to_string(landing.begin) + " to " +
+                            std::to_string(landing.end) + " s; touchdowns:";
+      for (const double touchdown : plan->touchdowns) message += ' ' + std::to_string(touchdown);
+      throw std::invalid_argument(message + (plan->touchdowns.empty() ? " none" : " s"));
     }
   }
   return plan;
@@ -152,6 +154,11 @@ Simulation::Simulation(const Options& options, const Sequence& sequence)
   fault_clock(lasers_, options.faults, SensorStream::laser);
 
   exposures_ = regular_stamps(options.camera_rate_hz, kCameraPhase, end);
+  take_frames(sequence);
+}
+
+void Simulation::take_frames(const Sequence& sequence) {
+  const Options& options = options_;
   frames_ = deliver(exposures_, options.faults, options.seed);
   for (const Frame& frame : frames_) frame_times_.push_back(frame.t_ns);
   for (std::size_t i = 0; i < frames_.size(); ++i) {
@@ -159,20 +166,20 @@ Simulation::Simulation(const Options& options, const Sequence& sequence)
   }
   std::stable_sort(deliveries_.begin(), deliveries_.end(),
                    [](const Delivery& a, const Delivery& b) { return a.arrival_ns < b.arrival_ns; });
-  if (options.tracks) {
-    const bool lands_hard = std::any_of(options.faults.begin(), options.faults.end(),
-                                        [](const Fault& fault) { return fault.kind == FaultKind::hard_landing; });
-    const auto clean_plan = lands_hard ? planned(without_faults(options), sequence, *true_calibration_.encoder) : plan_;
-    Rng track_rng = make_rng(options.seed, Stream::tracks);
-    Tracks clean = generate_tracks(scene_, clean_plan->trajectory, sensors.cameras, exposures_, obstruction_,
-                                   options.track, track_rng);
-    if (options.faults.empty()) {
-      tracks_ = std::move(clean.frames);
-    } else {
-      tracks_ = fault_tracks(clean, frames_,
-                             {options.faults, sensors.cameras, clean_plan->trajectory, trajectory, passersby_,
-                              options.track, options.seed});
-    }
+  if (!options.tracks) return;
+  const bool lands_hard = std::any_of(options.faults.begin(), options.faults.end(),
+                                      [](const Fault& fault) { return fault.kind == FaultKind::hard_landing; });
+  const auto clean_plan = lands_hard ? planned(without_faults(options), sequence, *true_calibration_.encoder) : plan_;
+  Rng track_rng = make_rng(options.seed, Stream::tracks);
+  const std::vector<CameraCalibration>& cameras = true_calibration_.cameras;
+  Tracks clean =
+      generate_tracks(scene_, clean_plan->trajectory, cameras, exposures_, obstruction_, options.track, track_rng);
+  if (options.faults.empty()) {
+    tracks_ = std::move(clean.frames);
+  } else {
+    tracks_ = fault_tracks(
+        clean, frames_,
+        {options.faults, cameras, clean_plan->trajectory, plan_->trajectory, passersby_, options.track, options.seed});
   }
 }
 

@@ -108,6 +108,7 @@ class Simulation {
 
  private:
   Simulation(const Options& options, const Sequence& sequence);
+  void take_frames(const Sequence& sequence);
 
   Options options_;
   Calibration true_calibration_;

@@ -1,0 +1,35 @@
+// When to ask the estimator for a step because no image comes.
+#pragma once
+
+#include <limits>
+
+#include "ear/types.h"
+
+namespace ear::tools {
+
+/// Without images the wheels carry on: always on a vehicle without a camera, else while images are missing. Without
+/// wheels there is nothing but inertia, and its estimate would be no more than a plausible lie. Times are IMU times.
+class BlindSteps {
+ public:
+  BlindSteps(bool has_camera, bool has_wheels) : has_wheels_(has_wheels), missing_from_ns_(has_camera ? kNever : 0) {}
+
+  void saw_frame(TimeNs t_ns) { missing_from_ns_ = t_ns + kPatience; }
+
+  /// Whether a step is due now; then the next one is due kStep later.
+  [[nodiscard]] bool due(TimeNs t_ns) {
+    if (!has_wheels_ || t_ns < missing_from_ns_ || t_ns < next_step_ns_) return false;
+    next_step_ns_ = t_ns + kStep;
+    return true;
+  }
+
+ private:
+  static constexpr TimeNs kNever = std::numeric_limits<TimeNs>::max();
+  static constexpr TimeNs kStep = 50'000'000;       // between estimates without images
+  static constexpr TimeNs kPatience = 150'000'000;  // so long after the last image the next one is missing
+
+  bool has_wheels_;
+  TimeNs missing_from_ns_;  // before the first image of a camera nothing is missing
+  TimeNs next_step_ns_ = 0;
+};
+
+}  // namespace ear::tools
