@@ -14,26 +14,35 @@ constexpr double kNegligiblePivot = 1e-11;  // of the sum before projection: rou
 /// First column of a clone, counted from err::camera.
 constexpr int clone_column(int clone) { return err::clone(clone) - err::camera; }
 
-/// The rows of which A = H^T H and b = H^T r are the sums: Cholesky, A = U^T U, gives U and U^-T b. A, of which only
-/// the lower triangle is read, is singular (yaw and position are free, calibration is seen in part): a pivot lost in
-/// rounding, against `scale`, says nothing, and its row is left out. A and b are overwritten.
+/// The rows of which A = H^T H and b = H^T r are the sums: Cholesky with diagonal pivoting. A, of which only the lower
+/// triangle is read, is singular (yaw and position are free, calibration is seen in part). The largest pivot against
+/// `scale` comes first, so that rounding does not grow; one lost in rounding says nothing, and ends it. Without the
+/// pivoting rounding makes up rows, and once in some ten thousand frames one that moves the estimate by ten sigmas.
+/// A and b are overwritten.
 void rows_from_sums(Eigen::Ref<Eigen::MatrixXd> A, Eigen::Ref<Eigen::VectorXd> b, const Eigen::VectorXd& scale,
                     WhitenedRows& rows) {
   const int size = static_cast<int>(b.size());
   rows.count = 0;
-  for (int j = 0; j < size; ++j) {
-    const double pivot = A(j, j);
-    if (pivot <= kNegligiblePivot * scale(j)) continue;
-    const int rest = size - j - 1;
-    const double root = std::sqrt(pivot);
-    auto u = A.col(j).tail(rest);
-    u /= root;
-    rows.H.row(rows.count).head(j).setZero();
-    rows.H(rows.count, j) = root;
-    rows.H.row(rows.count).segment(j + 1, rest) = u.transpose();
+  while (rows.count < size) {
+    int j = 0;
+    double largest = 0.0;
+    for (int k = 0; k < size; ++k) {
+      const double pivot = A(k, k);
+      if (pivot <= largest * scale(k)) continue;
+      largest = pivot / scale(k);
+      j = k;
+    }
+    if (largest <= kNegligiblePivot) return;
+    const double root = std::sqrt(A(j, j));
+    auto u = rows.H.row(rows.count).head(size);
+    u.head(j) = A.row(j).head(j) / root;
+    u(j) = root;
+    u.tail(size - j - 1) = A.col(j).tail(size - j - 1).transpose() / root;
     rows.r(rows.count) = b(j) / root;
-    b.tail(rest) -= rows.r(rows.count) * u;
-    A.bottomRightCorner(rest, rest).selfadjointView<Eigen::Lower>().rankUpdate(u, -1.0);
+    b -= rows.r(rows.count) * u.transpose();
+    A.selfadjointView<Eigen::Lower>().rankUpdate(u.transpose(), -1.0);
+    A.row(j).head(j + 1).setZero();
+    A.col(j).tail(size - j - 1).setZero();
     ++rows.count;
   }
 }

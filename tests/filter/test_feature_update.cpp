@@ -2,6 +2,7 @@
 
 #include <Eigen/LU>
 #include <Eigen/QR>
+#include <cmath>
 #include <random>
 
 #include "filter/chi_squared.h"
@@ -46,6 +47,45 @@ Scene random_scene(std::mt19937_64& rng, int clones, double outlier = 0.0) {
     for (int camera = 0; camera < 2; ++camera) {
       Eigen::Vector2d uv = project(scene.x, i, camera, f_W) + kSigma * random_vector(rng, 1.0).head<2>();
       if (i == 1 && camera == 0) uv.x() += outlier;
+      const CameraPose& pose = cameras[static_cast<std::size_t>(2 * i + camera)];
+      scene.sightings.push_back({pose.R_CW, pose.p_WC, uv});
+      who.emplace_back(i, camera);
+    }
+  }
+  const auto point = triangulate(scene.sightings);
+  REQUIRE(point);
+  scene.point = *point;
+  for (std::size_t k = 0; k < who.size(); ++k) {
+    scene.observations.push_back(
+        linearize_observation(scene.x, who[k].first, who[k].second, scene.point, scene.sightings[k].uv));
+  }
+  return scene;
+}
+
+/// As in a drive at a few decimetres a second: clones are centimetres apart, and few see the point, near or far.
+Scene slow_scene(std::mt19937_64& rng, int clones) {
+  Scene scene;
+  scene.x = random_state(rng, clones);
+  const Pose start = scene.x.clones.front().T_WB;
+  for (int i = 0; i < clones; ++i) {
+    Pose& T_WB = scene.x.clones[static_cast<std::size_t>(i)].T_WB;
+    T_WB.R = start.R * exp_so3(0.01 * i * random_vector(rng, 1.0));
+    T_WB.p = start.p + start.R * (0.02 * i * Eigen::Vector3d::UnitX() + random_vector(rng, 0.001));
+  }
+  scene.x.camera.T_BC0.R << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+  scene.x.camera.T_C0C1 = {Eigen::Matrix3d::Identity(), Eigen::Vector3d(0.05, 0.0, 0.0)};
+  std::vector<CameraPose> cameras;
+  camera_poses(scene.x, cameras);
+  std::uniform_real_distribution<double> unit(0.0, 1.0);
+  const double depth = 0.3 * std::pow(30.0, unit(rng));
+  const CameraPose& last = cameras[static_cast<std::size_t>(2 * clones - 2)];
+  const Eigen::Vector3d f_W =
+      last.p_WC + depth * (last.R_CW.transpose() * Eigen::Vector3d(unit(rng) - 0.5, unit(rng) - 0.5, 1.0));
+  const int first = static_cast<int>(unit(rng) * (clones - 1));
+  std::vector<std::pair<int, int>> who;
+  for (int i = first; i < clones; ++i) {
+    for (int camera = 0; camera < 2; ++camera) {
+      const Eigen::Vector2d uv = project(scene.x, i, camera, f_W) + kSigma * random_vector(rng, 1.0).head<2>();
       const CameraPose& pose = cameras[static_cast<std::size_t>(2 * i + camera)];
       scene.sightings.push_back({pose.R_CW, pose.p_WC, uv});
       who.emplace_back(i, camera);
@@ -143,6 +183,28 @@ TEST_CASE("feature: the summed information is the null-space projection") {
   CHECK((H.transpose() * H - expected).norm() < 1e-8 * expected.norm());
   const Eigen::VectorXd expected_b = (H_x.transpose() * r).tail(H.cols());
   CHECK((H.transpose() * information.residual() - expected_b).norm() < 1e-8 * expected_b.norm());
+}
+
+TEST_CASE("feature: rounding makes up no rows and no residual") {
+  std::mt19937_64 rng{67};
+  for (int trial = 0; trial < 300; ++trial) {
+    CAPTURE(trial);
+    const Scene scene = slow_scene(rng, 12);
+    Eigen::MatrixXd H_x, H_f;
+    Eigen::VectorXd r;
+    stack(scene, H_x, H_f, r);
+    project_out(H_x, H_f, r);
+    FeatureInformation information(12, 4);
+    information.start(scene.x.error_size());
+    const Covariance P = some_covariance(rng, scene.x);
+    REQUIRE(information.add(scene.observations, kSigma, 1e9, P.matrix(), [](int) { return 1e9; }));
+    information.compress();
+    CHECK(information.H().rows() <= r.size() + 3);  // the point is projected out but for a prior of no weight
+    CHECK(information.residual().norm() <= (1.0 + 1e-6) * r.norm());
+    const Eigen::MatrixXd expected =
+        (H_x.transpose() * H_x).bottomRightCorner(information.H().cols(), information.H().cols());
+    CHECK((information.H().transpose() * information.H() - expected).norm() < 1e-7 * expected.norm());
+  }
 }
 
 TEST_CASE("feature: an update by two features is that of their stacked rows") {
