@@ -6,34 +6,33 @@
 namespace ear {
 namespace {
 
-constexpr double kGravity = 9.81;           // [m/s^2]
-constexpr double kFreeFall = 3.0;           // [m/s^2] less specific force than this, and nothing carries the vehicle
-constexpr double kFallDuration = 0.04;      // [s]
-constexpr double kSpinUp = 0.5;             // [rad/s] within kSpinUpTime: no free wheel gets faster by itself
-constexpr double kSpinUpTime = 0.1;         // [s]
-constexpr double kConfirmation = 0.1;       // [s] a strike or spin-up confirms so long
-constexpr double kRecent = 0.3;             // [s] the way rolled in this time counts for the tolerance
-constexpr double kRecentWay = 0.2;          // [m] after so much the ground may be as uneven as it gets
-constexpr double kLevelWay = 0.2;           // [m] over which the ground's shape changes
-constexpr double kLevelTime = 2.0;          // [s] the same for a vehicle at rest
-constexpr double kLongestImuGap = 0.1;      // [s]
-constexpr double kLongestEncoderGap = 0.1;  // [s]
-constexpr double kAirSpeed = 1.0;           // [m/s] at which the ground passes below a flying vehicle
-constexpr double kFirstDuration = 0.1;      // [s] of evidence for the first mode
-constexpr double kSilence = 0.3;            // [s] without a reading that agrees, the beams say nothing
-constexpr double kHeightKnown = 0.05;       // [m]
-constexpr double kNormalKnown = 0.087;      // [rad]
+constexpr double kGravity = 9.81;       // [m/s^2]
+constexpr double kFreeFall = 3.0;       // [m/s^2] less specific force than this, and nothing carries the vehicle
+constexpr double kFallDuration = 0.04;  // [s]
+constexpr double kConfirmation = 0.1;   // [s] for which a strike or driven wheels confirm
+constexpr double kJustNow = 0.3;        // [s] the way rolled in this time counts for the tolerance
+constexpr double kFullWay = 0.2;        // [m] of it, and the ground may be as uneven as it gets
+constexpr double kLevelSigma = 0.02;    // [m] of the wheels' height over the plane, on the ground
+constexpr double kLevelWay = 0.2;   // [m] over which this height changes; the sight of it is renewed ten times as often
+constexpr double kLevelTime = 2.0;  // [s] the same for a vehicle at rest
+constexpr double kLongestStep = 0.1;    // [s] between inertial samples
+constexpr double kAirSpeed = 1.0;       // [m/s] at which the ground passes below a flying vehicle
+constexpr double kFirstDuration = 0.1;  // [s] of evidence for the first mode
+constexpr double kSilence = 0.3;        // [s] without a reading that agrees, and the beams say nothing
+constexpr double kHeightKnown = 0.05;   // [m]
+constexpr double kNormalKnown = 0.087;  // [rad]
 
 }  // namespace
 
 ContactDetector::ContactDetector(const ContactConfig& config, const Calibration& calibration) : config_(config) {
   if (!calibration.encoder) return;
-  axle_ = *calibration.encoder;
-  if (calibration.lasers && !calibration.lasers->beams.empty()) {
-    ground_.emplace(*calibration.lasers, axle_);
-  } else {
+  if (!calibration.lasers || calibration.lasers->beams.empty()) {
     mode_ = ContactMode::ground;
+    return;
   }
+  y_B_ = calibration.encoder->T_BO.linear().col(1);
+  ground_.emplace(*calibration.lasers, *calibration.encoder);
+  wheels_.emplace(*calibration.encoder);
 }
 
 std::optional<TimeNs> ContactDetector::since_ns() const {
@@ -52,22 +51,22 @@ std::optional<Eigen::Vector3d> ContactDetector::n_B() const {
 
 ContactEvent ContactDetector::add_imu(const ImuSample& sample) {
   if (!ground_ || !sample.gyro_B.allFinite() || !sample.accel_B.allFinite()) return ContactEvent::none;
-  const double dt = seconds_between(last_imu_ns_, sample.t_ns);
+  if (sample.t_ns <= last_imu_ns_) return ContactEvent::none;
   const bool first = last_imu_ns_ == kNever;
-  if (!first && dt <= 0.0) return ContactEvent::none;
+  const double dt = first ? 0.0 : std::min(seconds_between(last_imu_ns_, sample.t_ns), kLongestStep);
   last_imu_ns_ = sample.t_ns;
-  if (first || dt > kLongestImuGap) return ContactEvent::none;
 
   const Eigen::Vector3d angle_B = dt * (sample.gyro_B - b_g_);
   ground_->turn(angle_B, sample.accel_B, dt);
-  wheels_.pitch += angle_B.dot(axle_.T_BO.linear().col(1));
+  wheels_->turn_body(angle_B.dot(y_B_));
   if (mode_ != ContactMode::ground) ground_->move(kAirSpeed * dt);
 
   const double force = sample.accel_B.norm();
-  if (force > kFreeFall)
+  if (force > kFreeFall) {
     falling_since_ns_ = kNever;
-  else if (falling_since_ns_ == kNever)
+  } else if (falling_since_ns_ == kNever) {
     falling_since_ns_ = sample.t_ns;
+  }
   if (std::abs(force - kGravity) > config_.strike) {
     strike_ns_ = sample.t_ns;
     ground_->strike();
@@ -77,54 +76,11 @@ ContactEvent ContactDetector::add_imu(const ImuSample& sample) {
 
 ContactEvent ContactDetector::add_encoder(const EncoderSample& sample) {
   if (!ground_) return ContactEvent::none;
-  const std::optional<EncoderSample> last = wheels_.last;
-  const double pitch = wheels_.pitch;
-  if (last && sample.t_ns <= last->t_ns) return ContactEvent::none;
-  wheels_.last = sample;
-  wheels_.pitch = 0.0;
-  if (!last) return ContactEvent::none;
-  const double dt = seconds_between(last->t_ns, sample.t_ns);
-  const auto turned = [&](std::int64_t from, std::int64_t to) {
-    std::int64_t n = to - from;
-    if (axle_.wraps) {
-      n %= axle_.resolution;
-      if (2 * n >= axle_.resolution) n -= axle_.resolution;
-      if (2 * n < -axle_.resolution) n += axle_.resolution;
-    }
-    return 2.0 * M_PI * static_cast<double>(n) / static_cast<double>(axle_.resolution);
-  };
-  const std::array<double, 2> angle{turned(last->left_count, sample.left_count),
-                                    turned(last->right_count, sample.right_count)};
-  const double follow = 1.0 - std::exp(-dt / kSpinUpTime);
-  double distance = 0.0;
-  for (std::size_t i = 0; i < 2; ++i) {
-    distance = std::max(distance, std::abs(axle_.wheel_radius[i] * (angle[i] + pitch)));
-    const double rate = angle[i] / dt;
-    const double spin = (angle[i] + pitch) / dt;
-    if (dt < kLongestEncoderGap && std::abs(rate) > std::abs(wheels_.slow_rate[i]) + kSpinUp &&
-        std::abs(spin) > std::abs(wheels_.slow_spin[i]) + kSpinUp) {
-      wheels_.spun_up_ns = sample.t_ns;
-    }
-    wheels_.slow_rate[i] += follow * (rate - wheels_.slow_rate[i]);
-    wheels_.slow_spin[i] += follow * (spin - wheels_.slow_spin[i]);
-  }
-  roll(distance, dt);
+  const std::optional<WheelWatch::Motion> motion = wheels_->add(sample);
+  if (!motion) return ContactEvent::none;
+  if (motion->driven) driven_ns_ = sample.t_ns;
+  roll(*motion);
   return look_for_confirmed_touchdown(sample.t_ns);
-}
-
-void ContactDetector::roll(double distance, double dt) {
-  wheels_.recent_way = wheels_.recent_way * std::exp(-dt / kRecent) + distance;
-  if (mode_ != ContactMode::ground) return;
-  ground_->move(distance);
-  ground_->suppose_height(level_, 0.02 / std::sqrt(distance / 0.02 + dt / 2.0));
-  const double follow = 1.0 - std::exp(-distance / kLevelWay - dt / kLevelTime);
-  level_ =
-      std::clamp(level_ + follow * (ground_->height() - level_), -config_.touchdown_height, config_.touchdown_height);
-}
-
-double ContactDetector::tolerance(bool all_agree) const {
-  const double doubt = all_agree ? std::min(1.0, wheels_.recent_way / kRecentWay) : 1.0;
-  return config_.takeoff_height + config_.unevenness * doubt;
 }
 
 ContactEvent ContactDetector::add_laser(const LaserSample& sample) {
@@ -134,13 +90,30 @@ ContactEvent ContactDetector::add_laser(const LaserSample& sample) {
   switch (mode_) {
     case ContactMode::unknown:
       return look_for_first_evidence(sample.t_ns);
+    case ContactMode::ground:
+      return look_for_takeoff(sighting, sample.t_ns);
     case ContactMode::air:
       return look_for_touchdown(sample.t_ns);
-    case ContactMode::ground:
-      break;
   }
-  const ContactEvent event = look_for_takeoff(sighting, sample.t_ns);
-  return event;
+  return ContactEvent::none;
+}
+
+/// On the ground every metre rolled is new ground: another normal, another height of the wheels over the plane.
+void ContactDetector::roll(const WheelWatch::Motion& motion) {
+  recent_way_ = recent_way_ * std::exp(-motion.dt / kJustNow) + motion.distance;
+  if (mode_ != ContactMode::ground) return;
+  ground_->move(motion.distance);
+  const double renewals = motion.distance / (0.1 * kLevelWay) + motion.dt / kLevelTime;
+  ground_->suppose_height(level_, kLevelSigma / std::sqrt(renewals));
+  const double share = 1.0 - std::exp(-motion.distance / kLevelWay - motion.dt / kLevelTime);
+  const double level = level_ + share * (ground_->height() - level_);
+  level_ = std::clamp(level, -config_.touchdown_height, config_.touchdown_height);
+}
+
+/// How far the wheels may seem to be above `level_` without being in the air.
+double ContactDetector::tolerance(bool all_agree) const {
+  const double doubt = all_agree ? std::min(1.0, recent_way_ / kFullWay) : 1.0;
+  return config_.takeoff_height + config_.unevenness * doubt;
 }
 
 ContactEvent ContactDetector::look_for_first_evidence(TimeNs t_ns) {
@@ -148,30 +121,34 @@ ContactEvent ContactDetector::look_for_first_evidence(TimeNs t_ns) {
   return change(ground_->height() < config_.confirmed_height ? ContactMode::ground : ContactMode::air, t_ns);
 }
 
+/// Every beam that is believed must see the ground below the wheels, and there must be two (one, where there is but
+/// one).
 ContactEvent ContactDetector::look_for_takeoff(const GroundTracker::Sighting& sighting, TimeNs t_ns) {
-  const double allowed = level_ + tolerance(sighting.agreeing == ground_->beams());
-  const bool seen = sighting.agreeing >= std::min(2, ground_->beams()) &&
-                    ground_->height() - 2.0 * ground_->height_sigma() > allowed &&
-                    sighting.lowest_lift > level_ + 0.5 * config_.takeoff_height;
+  const double lowest = ground_->height() - 2.0 * ground_->height_sigma();
+  const bool airborne = sighting.agreeing >= std::min(2, ground_->beams()) &&
+                        lowest > level_ + tolerance(sighting.agreeing == ground_->beams()) &&
+                        sighting.lowest_lift > level_ + 0.5 * config_.takeoff_height;
   const bool falling = falling_since_ns_ != kNever && seconds_between(falling_since_ns_, t_ns) > kFallDuration;
-  return lasts(seen, t_ns, falling ? 0.0 : config_.takeoff_duration) ? change(ContactMode::air, t_ns)
-                                                                     : ContactEvent::none;
+  if (!lasts(airborne, t_ns, falling ? 0.0 : config_.takeoff_duration)) return ContactEvent::none;
+  return change(ContactMode::air, t_ns);
 }
 
 ContactEvent ContactDetector::look_for_touchdown(TimeNs t_ns) {
-  const bool low = ground_->height_sigma() < config_.touchdown_height && ground_->height() < config_.touchdown_height &&
-                   std::abs(ground_->climb()) < config_.touchdown_climb;
-  return lasts(low, t_ns, config_.touchdown_duration) ? change(ContactMode::ground, t_ns)
-                                                      : look_for_confirmed_touchdown(t_ns);
+  const bool standing = ground_->height_sigma() < config_.touchdown_height &&
+                        ground_->height() < config_.touchdown_height &&
+                        std::abs(ground_->climb()) < config_.touchdown_climb;
+  if (lasts(standing, t_ns, config_.touchdown_duration)) return change(ContactMode::ground, t_ns);
+  return look_for_confirmed_touchdown(t_ns);
 }
 
+/// Something struck the vehicle, or drives its wheels, while it is low. Where the beams say nothing it takes both.
 ContactEvent ContactDetector::look_for_confirmed_touchdown(TimeNs t_ns) {
   if (mode_ != ContactMode::air) return ContactEvent::none;
-  const bool strike = seconds_between(strike_ns_, t_ns) < kConfirmation;
-  const bool spin = seconds_between(wheels_.spun_up_ns, t_ns) < kConfirmation;
+  const bool struck = seconds_between(strike_ns_, t_ns) < kConfirmation;
+  const bool driven = seconds_between(driven_ns_, t_ns) < kConfirmation;
   const bool silent = seconds_between(seen_ns_, t_ns) > kSilence;
   const bool low = ground_->height_sigma() < kHeightKnown && ground_->height() < config_.confirmed_height;
-  if (silent ? strike && spin : low && (strike || spin)) return change(ContactMode::ground, t_ns);
+  if (silent ? struck && driven : low && (struck || driven)) return change(ContactMode::ground, t_ns);
   return ContactEvent::none;
 }
 
@@ -191,7 +168,7 @@ ContactEvent ContactDetector::change(ContactMode mode, TimeNs t_ns) {
   holds_since_ns_ = kNever;
   if (mode == ContactMode::ground) {
     level_ = std::clamp(ground_->height(), -config_.touchdown_height, config_.touchdown_height);
-    wheels_.recent_way = kRecentWay;  // on new ground
+    recent_way_ = kFullWay;  // on new ground
   }
   if (first) return ContactEvent::none;
   return mode == ContactMode::ground ? ContactEvent::touchdown : ContactEvent::takeoff;

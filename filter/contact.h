@@ -1,10 +1,9 @@
 // Does the vehicle stand or roll on the ground, or does it fly? The beams decide: contact is when the plane they hit
 // passes the wheel radius below the axle. A strike or wheels that are spun up from below only make the decision faster.
-// docs/filter.md, section "Contact".
+// docs/filter.md, section 8.
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 #include <cstdint>
 #include <limits>
 #include <optional>
@@ -13,6 +12,7 @@
 #include "ear/filter_config.h"
 #include "ear/types.h"
 #include "filter/ground_tracker.h"
+#include "filter/wheel_watch.h"
 
 namespace ear {
 
@@ -48,16 +48,6 @@ class ContactDetector {
  private:
   static constexpr TimeNs kNever = std::numeric_limits<TimeNs>::min() / 2;
 
-  /// What the wheels tell: the way they roll, and whether something drives them.
-  struct Wheels {
-    std::optional<EncoderSample> last;
-    double pitch = 0.0;                 ///< by which the body turned about the axle since then [rad]
-    std::array<double, 2> slow_rate{};  ///< relative to the body, as it was 0.1 s ago [rad/s]
-    std::array<double, 2> slow_spin{};  ///< the same relative to the world
-    TimeNs spun_up_ns = kNever;         ///< when they last turned faster than they can by themselves
-    double recent_way = 0.0;            ///< rolled within the last half second [m]
-  };
-
   ContactEvent change(ContactMode mode, TimeNs t_ns);
   ContactEvent look_for_first_evidence(TimeNs t_ns);
   ContactEvent look_for_takeoff(const GroundTracker::Sighting& sighting, TimeNs t_ns);
@@ -65,22 +55,24 @@ class ContactDetector {
   ContactEvent look_for_confirmed_touchdown(TimeNs t_ns);
   [[nodiscard]] bool lasts(bool holds, TimeNs t_ns, double duration);
   [[nodiscard]] double tolerance(bool all_agree) const;
-  void roll(double distance, double dt);
+  void roll(const WheelWatch::Motion& motion);
 
   ContactConfig config_;
-  EncoderCalibration axle_;
-  std::optional<GroundTracker> ground_;
-  Wheels wheels_;
+  Eigen::Vector3d y_B_ = Eigen::Vector3d::UnitY();  ///< along the axle, to the left
+  std::optional<GroundTracker> ground_;             ///< none without wheels or lasers
+  std::optional<WheelWatch> wheels_;
   Eigen::Vector3d b_g_ = Eigen::Vector3d::Zero();
 
   ContactMode mode_ = ContactMode::unknown;
   TimeNs since_ns_ = kNever;
   TimeNs holds_since_ns_ = kNever;  ///< first reading in a row that speaks for a change
   TimeNs seen_ns_ = kNever;         ///< last reading that agreed with the plane tracked
+  TimeNs driven_ns_ = kNever;       ///< when something last made the wheels turn faster
   TimeNs last_imu_ns_ = kNever;
   TimeNs falling_since_ns_ = kNever;
   TimeNs strike_ns_ = kNever;
-  double level_ = 0.0;  ///< height of standing wheels over the plane, which the ground's shape explains [m]
+  double recent_way_ = 0.0;  ///< rolled just now [m]
+  double level_ = 0.0;       ///< height of standing wheels over the plane, which the ground's shape explains [m]
 };
 
 }  // namespace ear

@@ -58,8 +58,8 @@ void GroundTracker::turn(const Eigen::Vector3d& angle_B, const Eigen::Vector3d& 
 void GroundTracker::move(double distance) {
   if (!(distance > 0.0) || up_B_.isZero()) return;
   widen_normal(kNormalWalk * kNormalWalk * distance);
-  const double pull = std::pow(kSlope, 4) / (kNormalWalk * kNormalWalk * distance);
-  for (int axis = 0; axis < 3; ++axis) update(Vector::Unit(axis), up_B_(axis) - x_(axis), pull);
+  const double variance = std::pow(kSlope, 4) / (kNormalWalk * kNormalWalk * distance);
+  for (int axis = 0; axis < 3; ++axis) update(Vector::Unit(axis), up_B_(axis) - x_(axis), variance);
 }
 
 void GroundTracker::strike() { P_(kClimb, kClimb) += kStrikeClimb * kStrikeClimb; }
@@ -93,6 +93,7 @@ GroundTracker::Sighting GroundTracker::update(const LaserSample& sample) {
   return sighting;
 }
 
+/// A return that is not always the same: noise makes each reading of a working beam another one.
 bool GroundTracker::usable(Beam& beam, double range) const {
   beam.same = range == beam.last ? beam.same + 1 : 1;
   beam.last = range;

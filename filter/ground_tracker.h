@@ -24,8 +24,8 @@ class GroundTracker {
   void move(double distance);
   /// The rate of climb may have changed at once: a strike.
   void strike();
-  /// The wheels are said to be `level` above the plane, with standard deviation `sigma` [m]. Ignored if the beams know
-  /// better.
+  /// The wheels are said to be `level` above the plane, with standard deviation `sigma` [m]. Ignored if the beams say
+  /// otherwise.
   void suppose_height(double level, double sigma);
 
   /// How one reading of the beams agreed with the plane tracked so far.
@@ -49,6 +49,13 @@ class GroundTracker {
   using Vector = Eigen::Matrix<double, kSize, 1>;
   using Matrix = Eigen::Matrix<double, kSize, kSize>;
 
+  struct Beam {
+    double last = 0.0;  ///< range [m]
+    int same = 0;       ///< readings in a row with this range
+    int owed = 0;       ///< readings that must agree before the beam is used again
+  };
+
+  [[nodiscard]] bool usable(Beam& beam, double range) const;
   void predict(double dt);
   void forget();
   void widen_normal(double variance);
@@ -62,14 +69,8 @@ class GroundTracker {
   Eigen::Vector3d up_B_ = Eigen::Vector3d::Zero();  ///< against gravity, roughly; zero before the first sample
   Vector x_ = Vector::Zero();                       ///< n_B, height, climb
   Matrix P_ = Matrix::Zero();
-  struct Beam {
-    double last = 0.0;
-    int same = 0;
-    int owed = 0;
-  };
-  [[nodiscard]] bool usable(Beam& beam, double range) const;
-  std::vector<Beam> beams_;  ///< per beam: readings in agreement that it owes before it is used again
-  int lost_ = 0;             ///< readings in a row of which none agreed
+  std::vector<Beam> beams_;
+  int lost_ = 0;  ///< readings in a row of which none agreed
   bool any_ = false;
   TimeNs last_ns_ = 0;
 };

@@ -8,6 +8,7 @@ namespace {
 
 constexpr double kSpread = 4.0;        // deviations from the mean, in standard deviations, are ordinary
 constexpr double kErrorShare = 0.1;    // of a deviation: bandwidth, scale and timing make that much of it wrong
+constexpr double kLongest = 0.06;      // [s] a longer deviation is no strike, but how the vehicle moves
 constexpr double kFull = 0.98;         // of the range or more is clipped
 constexpr double kFlat = 1e-3;         // relative: two extreme values as equal as this were cut off
 constexpr double kGyroMemory = 0.05;   // [s] bodies turn fast, but not suddenly
@@ -34,8 +35,14 @@ double ExcessWatch::add(const Eigen::Vector3d& value, double dt) {
   if (distance > 0.0) mean_ += share * counted / distance * deviation;
   variance_ += (1.0 - std::exp(-dt / (kSpreadMemory * memory_))) * (counted * counted - variance_);
 
-  if (cut_off) return std::max(distance, least_);
-  return distance > ordinary ? kErrorShare * distance : 0.0;
+  const bool strikes = distance > ordinary;
+  lasts_ = strikes || cut_off ? lasts_ + 1 : 0;
+  lasting_ = lasts_ > 1 ? lasting_ + dt : 0.0;
+  // The errors of one strike have one sign. White noise adds up as they do if the k-th sample has 2 k - 1 times the
+  // variance: n samples then have n^2 times that of one.
+  const double coherent = std::sqrt(std::max(0.0, 2.0 * lasts_ - 1.0));
+  if (cut_off) return coherent * std::max(distance, least_);
+  return strikes && lasting_ < kLongest ? coherent * kErrorShare * distance : 0.0;
 }
 
 /// At the end of a known range; or, where it is not known, at the level of a flat top: the same extreme value twice.
