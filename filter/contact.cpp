@@ -144,8 +144,11 @@ ContactEvent ContactDetector::look_for_touchdown(TimeNs t_ns) {
 /// Something struck the vehicle, or drives its wheels, while it is low. Where the beams say nothing it takes both.
 ContactEvent ContactDetector::look_for_confirmed_touchdown(TimeNs t_ns) {
   if (mode_ != ContactMode::air) return ContactEvent::none;
-  const bool struck = seconds_between(strike_ns_, t_ns) < kConfirmation;
-  const bool driven = seconds_between(driven_ns_, t_ns) < kConfirmation;
+  const auto just_now = [&](TimeNs what_ns) {  // and not before the vehicle left the ground
+    return what_ns > since_ns_ && seconds_between(what_ns, t_ns) < kConfirmation;
+  };
+  const bool struck = just_now(strike_ns_);
+  const bool driven = just_now(driven_ns_);
   const bool silent = seconds_between(seen_ns_, t_ns) > kSilence;
   const bool low = ground_->height_sigma() < kHeightKnown && ground_->height() < config_.confirmed_height;
   if (silent ? struck && driven : low && (struck || driven)) return change(ContactMode::ground, t_ns);

@@ -1,6 +1,6 @@
 // Does the vehicle stand or roll on the ground, or does it fly? The beams decide: contact is when the plane they hit
 // passes the wheel radius below the axle. A strike or wheels that are spun up from below only make the decision faster.
-// docs/filter.md, section 8.
+// docs/filter.md, section 11.
 #pragma once
 
 #include <Eigen/Core>
