@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "filter/contact.h"
-#include "filter/flat_ground.h"
+#include "tests/support/flat_ground.h"
 
 using namespace ear;
 using namespace ear::test;

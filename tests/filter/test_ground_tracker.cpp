@@ -3,8 +3,8 @@
 #include <functional>
 #include <limits>
 
-#include "filter/flat_ground.h"
 #include "filter/ground_tracker.h"
+#include "tests/support/flat_ground.h"
 
 using namespace ear;
 using namespace ear::test;
