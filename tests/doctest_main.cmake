@@ -1,7 +1,8 @@
-# ear_test(NAME name SOURCES a.cpp ... LIBRARIES target ... [LABEL unit|consistency|replay|bench] [TIMEOUT s])
+# ear_test(NAME name SOURCES a.cpp ... LIBRARIES target ... [LABEL unit|consistency|replay|bench] [TIMEOUT s]
+#          [ARGUMENTS of the program ...])
 # builds one doctest program and gives it to ctest: a test source cannot be built and forgotten.
 function(ear_test)
-  cmake_parse_arguments(arg "" "NAME;LABEL;TIMEOUT" "SOURCES;LIBRARIES" ${ARGN})
+  cmake_parse_arguments(arg "" "NAME;LABEL;TIMEOUT" "SOURCES;LIBRARIES;ARGUMENTS" ${ARGN})
   if(NOT arg_LABEL)
     set(arg_LABEL unit)
   endif()
@@ -14,6 +15,6 @@ function(ear_test)
   target_include_directories(${target} PRIVATE ${PROJECT_SOURCE_DIR}/tests)
   target_link_libraries(${target} PRIVATE doctest::doctest ${arg_LIBRARIES})
   target_compile_definitions(${target} PRIVATE EAR_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
-  add_test(NAME ${arg_NAME} COMMAND ${target})
+  add_test(NAME ${arg_NAME} COMMAND ${target} ${arg_ARGUMENTS})
   set_tests_properties(${arg_NAME} PROPERTIES LABELS ${arg_LABEL} TIMEOUT ${arg_TIMEOUT})
 endfunction()
