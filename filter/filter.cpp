@@ -16,6 +16,7 @@ namespace {
 constexpr std::size_t kImuCapacity = 4096;   // 20 s at 200 Hz, 4 s at 1 kHz
 constexpr std::size_t kWheelCapacity = 512;  // readings that wait for the state to pass them
 constexpr double kSpinUp = 0.1;              // [s] after a touchdown until the wheels roll
+constexpr double kDoubtTime = 0.5;           // [s] the contradiction of two wheels is one error so long
 constexpr double kSlipEnds = 0.15;           // [s] of agreement before a row that failed its gate is used again
 constexpr double kRollingWindow = 2.0;       // [s] of samples kept for a start while rolling
 constexpr double kRollingStart = 1.5;        // [s] of them that it takes
@@ -477,7 +478,7 @@ void Filter::update_with_wheels(const WheelTurn& turn) {
   Eigen::Vector3d turned_B = Eigen::Vector3d::Zero();
   imu_.for_each_piece(turn.from_ns, turn.to_ns,
                       [&](const Eigen::Vector3d& gyro_B, const Eigen::Vector3d&, double d) { turned_B += gyro_B * d; });
-  const WheelRows rows =
+  WheelRows rows =
       linearize_wheels(state_, motion.R_WB, motion.v_W, turn, turned_B / dt, odometer.model, beam_count_ > 0);
 
   const double per_root_metre = std::sqrt(std::abs(rows.wheel_speed) / dt);
@@ -490,7 +491,7 @@ void Filter::update_with_wheels(const WheelTurn& turn) {
     const double gyro = gyro_noise * rows.J_gyro.row(row).norm();
     return std::sqrt(a * a + b * b + c * c + gyro * gyro);
   };
-  Eigen::Matrix<double, WheelRows::size, 1> sigma;
+  Eigen::Vector4d sigma;
   sigma << root_sum(WheelRows::speed, odometer.speed_sigma, odometer.slip * per_root_metre, count_noise),
       root_sum(WheelRows::side, odometer.speed_sigma, odometer.side_slip * per_root_metre,
                odometer.side_slip_turn * yaw_rate),
@@ -499,7 +500,8 @@ void Filter::update_with_wheels(const WheelTurn& turn) {
 
   const bool use_yaw_rate = odometer.model == OdometerModel::differential || odometer.yaw_rate;
   const bool slope_known = odometer.model != OdometerModel::terrain || beam_count_ == 0 || ground_known_;
-  std::array<bool, WheelRows::size> use = {true, true, slope_known, use_yaw_rate};
+  const bool speed_known = choose_wheels(rows, sigma, turn);
+  std::array<bool, WheelRows::size> use = {speed_known, true, slope_known, use_yaw_rate && wheel_agreement_.agree()};
   Eigen::Matrix<double, WheelRows::size, kGroundColumns> H;
   Eigen::Matrix<double, WheelRows::size, 1> r;
   int count = 0;
@@ -516,6 +518,41 @@ void Filter::update_with_wheels(const WheelTurn& turn) {
     r(count++) = rows.residual(row) / sigma(row);
   }
   if (count > 0) update(H.topRows(count), err::nu, r.head(count));
+}
+
+/// Where the wheels contradict each other by the gyroscope, the one that agrees with the state tells the speed. False
+/// if none does. If both do, it lies somewhere between them. docs/filter.md, section 8.
+bool Filter::choose_wheels(WheelRows& rows, Eigen::Vector4d& sigma, const WheelTurn& turn) {
+  const double half = 0.5 * state_.odometer.wheel_separation;
+  const bool agreed = wheel_agreement_.agree();
+  wheel_agreement_.add(2.0 * half * rows.residual(WheelRows::yaw_rate),
+                       2.0 * half * std::sqrt(covariance_.variance(rows.H.row(WheelRows::yaw_rate), err::nu)),
+                       turn.to_ns);
+  if (wheel_agreement_.agree()) return true;
+  if (agreed) wheel_agrees_since_ns_.fill(kDisagrees);  // the state may have followed the wrong one a little
+
+  const double sigma_one = std::hypot(sigma(WheelRows::speed), half * sigma(WheelRows::yaw_rate));
+  std::array<WheelRows, 2> one = {rows, rows};
+  std::array<bool, 2> believed{};
+  for (std::size_t wheel = 0; wheel < 2; ++wheel) {
+    one[wheel].take_one_wheel(wheel == 0 ? -half : half);
+    const double residual = one[wheel].residual(WheelRows::speed);
+    const double variance = covariance_.variance(one[wheel].H.row(WheelRows::speed), err::nu) + sigma_one * sigma_one;
+    believed[wheel] =
+        agrees_again(wheel_agrees_since_ns_[wheel], residual * residual <= gate_(1) * variance, turn.to_ns);
+  }
+  if (believed[0] && believed[1]) {
+    const double doubt = 0.5 * wheel_agreement_.difference() * std::sqrt(kDoubtTime / turn.duration());
+    sigma(WheelRows::speed) = std::hypot(sigma(WheelRows::speed), doubt);
+    return true;
+  }
+  if (!believed[0] && !believed[1]) {
+    ++statistics_.wheel_rows_rejected;
+    return false;
+  }
+  rows = one[believed[0] ? 0 : 1];
+  sigma(WheelRows::speed) = sigma_one;
+  return true;
 }
 
 /// From the newest clone, which is here and now.

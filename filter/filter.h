@@ -24,6 +24,7 @@
 #include "filter/standstill.h"
 #include "filter/state.h"
 #include "filter/tracks.h"
+#include "filter/wheel_agreement.h"
 #include "filter/wheel_preintegration.h"
 #include "filter/wheels.h"
 
@@ -98,6 +99,7 @@ class Filter {
   [[nodiscard]] bool rolls_at(TimeNs t_ns) const;
   static bool agrees_again(TimeNs& since_ns, bool passes, TimeNs t_ns);
   void update_with_wheels(const WheelTurn& turn);
+  bool choose_wheels(WheelRows& rows, Eigen::Vector4d& sigma, const WheelTurn& turn);
   void start_displacement();
   void add_to_displacement(TimeNs until_ns);
   void update_with_displacement();
@@ -138,6 +140,8 @@ class Filter {
   TimeNs displacement_ns_ = 0;                       ///< up to where it goes
   ContactDetector contact_;
   std::array<TimeNs, WheelRows::size> agrees_since_ns_{};  ///< each row of the odometer with the state; kDisagrees
+  WheelAgreement wheel_agreement_;
+  std::array<TimeNs, 2> wheel_agrees_since_ns_{};  ///< each wheel by itself with the state, while they contradict
   WheelRest wheel_rest_;
   StandstillDetector standstill_;
   TrackTable tracks_;

@@ -27,6 +27,13 @@ std::optional<WheelTurn> EncoderReader::add(const EncoderSample& sample) {
   return turn;
 }
 
+void WheelRows::take_one_wheel(double lever) {
+  residual(speed) += lever * residual(yaw_rate);
+  H.row(speed) += lever * H.row(yaw_rate);
+  H(speed, ground_column(err::wheel_separation)) -= lever * residual(yaw_rate);  // the lever grows with it
+  J_gyro.row(speed) += lever * J_gyro.row(yaw_rate);
+}
+
 WheelRows linearize_wheels(const State& x, const Eigen::Matrix3d& R_WB, const Eigen::Vector3d& v_W,
                            const WheelTurn& turn, const Eigen::Vector3d& gyro_B, OdometerModel model,
                            bool normal_known) {

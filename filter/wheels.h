@@ -57,6 +57,10 @@ struct WheelRows {
   Eigen::Matrix<double, size, kGroundColumns> H = Eigen::Matrix<double, size, kGroundColumns>::Zero();
   Eigen::Matrix<double, size, 3> J_gyro;  ///< of the prediction by the measured rate
   double wheel_speed = 0.0;               ///< forward speed that the wheels tell [m/s]
+
+  /// In place of the mean of both wheels, one of them and the gyroscope's yaw rate tell the speed. `lever`: where it
+  /// stands on the axle, half the separation; negative for the left one [m].
+  void take_one_wheel(double lever);
 };
 
 /// The odometer's rows at a state that is `v_W` and `R_WB` at the middle of the turn; `gyro_B`: mean measured rate over

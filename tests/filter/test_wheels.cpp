@@ -79,6 +79,43 @@ TEST_CASE("wheels: uphill the velocity goes up, whatever the body's pitch") {
   CHECK(std::abs(planar.residual(WheelRows::slope)) > 0.1);
 }
 
+TEST_CASE("wheels: the wheel that rolls and the gyroscope tell the speed when the other one stands") {
+  State x = simple_state();
+  x.imu.v_W = {0.5, 0.0, 0.0};
+  const double rate = 0.8;
+  const double left = 0.5 - 0.5 * kSeparation * rate, right = 0.5 + 0.5 * kSeparation * rate;
+  WheelRows rows = rows_of(x, rims(0.0, right), {0.0, 0.0, rate});
+  CHECK(std::abs(rows.residual(WheelRows::speed)) > 0.1);
+  rows.take_one_wheel(0.5 * kSeparation);
+  CHECK(std::abs(rows.residual(WheelRows::speed)) < 1e-12);
+  rows = rows_of(x, rims(left, 0.0), {0.0, 0.0, rate});
+  rows.take_one_wheel(-0.5 * kSeparation);
+  CHECK(std::abs(rows.residual(WheelRows::speed)) < 1e-12);
+}
+
+TEST_CASE("wheels: the Jacobian of one wheel is the derivative, and knows nothing of the other's radius") {
+  std::mt19937_64 rng{52};
+  const WheelTurn turn = rims(0.4, 0.55);
+  const State x = random_state(rng, 0);
+  const Eigen::Vector3d gyro_B = random_vector(rng, 0.5);
+  const double lever = 0.5 * x.odometer.wheel_separation;
+  WheelRows rows = rows_of(x, turn, gyro_B, OdometerModel::gyro);
+  rows.take_one_wheel(lever);
+  const auto prediction = [&](const Eigen::VectorXd& part) -> Eigen::VectorXd {
+    Eigen::VectorXd d = Eigen::VectorXd::Zero(x.error_size());
+    d.head(part.size()) = part;
+    const State moved = boxplus(x, d);
+    const WheelRows both = rows_of(moved, turn, gyro_B, OdometerModel::gyro);
+    return -Eigen::VectorXd::Constant(1, both.residual(WheelRows::speed) + 0.5 * moved.odometer.wheel_separation *
+                                                                               both.residual(WheelRows::yaw_rate));
+  };
+  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(1, err::camera);
+  H.rightCols<kGroundColumns>() = rows.H.row(WheelRows::speed);
+  CHECK(std::abs(rows.H(WheelRows::speed, ground_column(err::wheel_radius))) < 1e-12);
+  CHECK(rows.H(WheelRows::speed, ground_column(err::wheel_radius) + 1) != 0.0);
+  check_jacobian(prediction, H);
+}
+
 TEST_CASE("wheels: Jacobians of every model are the derivatives") {
   std::mt19937_64 rng{51};
   WheelTurn turn = rims(0.4, 0.55);

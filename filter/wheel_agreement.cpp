@@ -1,0 +1,33 @@
+#include "filter/wheel_agreement.h"
+
+#include <cmath>
+
+namespace ear {
+namespace {
+
+constexpr double kMemory = 0.05;  // [s] over which the gyroscope's noise is averaged
+constexpr double kSlack = 0.02;   // [m/s] the ground's shape under two wheels, without any slip
+constexpr double kSigmas = 3.0;
+constexpr double kPause = 0.1;    // [s]
+constexpr double kReturn = 0.15;  // [s] without contradiction
+constexpr double kCloser = 0.5;   // the share of the limit that counts as agreement again
+
+}  // namespace
+
+void WheelAgreement::add(double difference, double sigma, TimeNs t_ns) {
+  const double dt = any_ ? seconds_between(last_ns_, t_ns) : 0.0;
+  if (!any_ || dt > kPause) *this = WheelAgreement{};
+  any_ = true;
+  last_ns_ = t_ns;
+  difference_ += (1.0 - std::exp(-dt / kMemory)) * (difference - difference_);
+
+  const double limit = (agree_ ? 1.0 : kCloser) * (kSlack + kSigmas * sigma);
+  if (std::abs(difference_) > limit) {
+    agree_ = false;
+    contradiction_ns_ = t_ns;
+  } else if (!agree_ && seconds_between(contradiction_ns_, t_ns) > kReturn) {
+    agree_ = true;
+  }
+}
+
+}  // namespace ear

@@ -1,0 +1,60 @@
+// Wheels that lie for five seconds, on feature tracks: the error stays near that of wheels that do not, and known.
+#include <doctest/doctest.h>
+
+#include <Eigen/Cholesky>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "tests/support/simulated_run.h"
+
+using namespace ear;
+
+namespace {
+
+struct Outcome {
+  double position = 0.0;  ///< RMS of the error, from the common start on [m]
+  double nees = 0.0;      ///< of the position, mean from the fault's start on; 3 is consistent
+};
+
+Outcome run(const std::string& sequence, const std::string& fault) {
+  simulator::Options options;
+  options.sequence = sequence;
+  options.seed = 821;
+  options.duration = 25.0;
+  if (!fault.empty()) options.faults = {simulator::parse_fault(fault)};
+  const simulator::Simulation simulation(options);
+  Filter filter(FilterConfig{}, simulation.calibration());
+  Outcome outcome;
+  int count = 0;
+  int later = 0;
+  for (const test::EvaluatedEstimate& e : test::run_filter(filter, simulation)) {
+    outcome.position += e.dp_W.squaredNorm();
+    ++count;
+    if (e.t < 10.0) continue;
+    const Eigen::Matrix3d P = e.estimate.covariance.block<3, 3>(estimate_error::position, estimate_error::position);
+    outcome.nees += e.dp_W.dot(P.ldlt().solve(e.dp_W));
+    ++later;
+  }
+  REQUIRE(later > 0);
+  outcome.position = std::sqrt(outcome.position / count);
+  outcome.nees /= later;
+  return outcome;
+}
+
+}  // namespace
+
+TEST_CASE("wheel faults: one wheel off the ground, counts that stay, wheels that slip or spin idly") {
+  for (const std::string sequence : {"flat1", "wave1"}) {
+    CAPTURE(sequence);
+    const Outcome clean = run(sequence, "");
+    for (const std::string fault : {"wheel_lifted.left@10+5", "wheel_lifted.right@10+5", "encoder_frozen.both@10+5",
+                                    "encoder_frozen.right@10+5", "wheel_slipping@10+5", "wheel_idle_spin.left@10+5"}) {
+      CAPTURE(fault);
+      const Outcome faulty = run(sequence, fault);
+      CAPTURE(faulty.nees);
+      CHECK(faulty.position < 2.0 * clean.position);
+      CHECK(faulty.nees < 3.0 + 2.0 * clean.nees);
+    }
+  }
+}
