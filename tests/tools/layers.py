@@ -25,6 +25,8 @@ EVERYTHING = [*LAYERS, "eigen", "opencv", "yaml-cpp", "json", "spdlog", "posix",
 LAYERS["tools/"] = ["tools/", "cli11", *EVERYTHING]
 LAYERS["tests/"] = ["tests/", "tools/", "doctest", *EVERYTHING]
 LAYERS["tests/tools/consumer/"] = ["include/ear/", "filter/", *STANDARD]
+LAYERS["examples/c/"] = ["include/ear/", "posix", *STANDARD]
+LAYERS["examples/filter_only/"] = ["include/ear/", "filter/", "eigen", *STANDARD]
 
 # Files, output, clocks and threads: the filter would build for a microcontroller.
 HOSTED = ["atomic", "chrono", "condition_variable", "cstdio", "ctime", "filesystem", "fstream", "future", "iostream",
@@ -54,10 +56,10 @@ def target_of(root, includer, name):
 
 
 def sources(root):
-    """All C++ files of the project, relative to its root."""
+    """All C and C++ files of the project, relative to its root."""
     for folder in sorted(root.iterdir()):
         if folder.is_dir() and folder.name not in (".git", "build", "install"):
-            yield from (file.relative_to(root) for file in sorted(folder.rglob("*")) if file.suffix in (".h", ".cpp"))
+            yield from (file.relative_to(root) for file in sorted(folder.rglob("*")) if file.suffix in (".h", ".c", ".cpp"))
 
 
 def check(root):

@@ -1,0 +1,365 @@
+// The C interface: converts the plain structs, and turns every exception into a result.
+#include "ear/ear_c.h"
+
+#include <algorithm>
+#include <cstdlib>
+#include <cstring>
+#include <exception>
+#include <memory>
+#include <new>
+#include <stdexcept>
+#include <string>
+
+#include "src/queued_odometry.h"
+
+struct ear_odometry {  // NOLINT(readability-identifier-naming): named by the C header
+  ear::QueuedOdometry queued;
+};
+
+namespace {
+
+static_assert(EAR_MAX_BEAMS == ear::QueuedOdometry::kMaxBeams);
+
+/// Nothing is thrown across the interface; `message` gets the reason.
+template <typename Function>
+ear_result guarded(const Function& function, char* message = nullptr, std::size_t message_size = 0) noexcept {
+  const auto fail = [&](ear_result result, const char* reason) {
+    if (message != nullptr && message_size > 0) {
+      const std::size_t length = std::min(std::strlen(reason), message_size - 1);
+      std::copy_n(reason, length, message);
+      message[length] = '\0';
+    }
+    return result;
+  };
+  try {
+    return function();
+  } catch (const std::invalid_argument& error) {
+    return fail(EAR_INVALID_ARGUMENT, error.what());
+  } catch (const std::bad_alloc&) {
+    return fail(EAR_OUT_OF_MEMORY, "out of memory");
+  } catch (const std::exception& error) {
+    return fail(EAR_INTERNAL_ERROR, error.what());
+  } catch (...) {
+    return fail(EAR_INTERNAL_ERROR, "unknown error");
+  }
+}
+
+Eigen::Vector3d vector_of(const double (&values)[3]) { return Eigen::Vector3d::Map(values); }
+
+Eigen::Isometry3d isometry_of(const double (&rows)[16]) {
+  const Eigen::Matrix4d matrix = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(rows);
+  Eigen::Isometry3d result = Eigen::Isometry3d::Identity();
+  result.linear() = matrix.topLeftCorner<3, 3>();
+  result.translation() = matrix.topRightCorner<3, 1>();
+  return result;
+}
+
+void write_isometry(const Eigen::Isometry3d& T, double (&rows)[16]) {
+  Eigen::Map<Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>{rows} = T.matrix();
+}
+
+/// The value of an enumeration, which in C can hold anything.
+template <typename E>
+E choice(int value, int count, const char* field) {
+  if (value < 0 || value >= count) throw std::invalid_argument(std::string(field) + ": no such choice");
+  return static_cast<E>(value);
+}
+
+void require_count(int value, int maximum, const char* field) {
+  if (value >= 0 && value <= maximum) return;
+  throw std::invalid_argument(std::string(field) + ": 0 to " + std::to_string(maximum));
+}
+
+ear::CameraCalibration camera_of(const ear_camera& from) {
+  ear::CameraCalibration camera;
+  camera.T_BC = isometry_of(from.T_BC);
+  camera.width = from.width;
+  camera.height = from.height;
+  camera.fu = from.fu;
+  camera.fv = from.fv;
+  camera.cu = from.cu;
+  camera.cv = from.cv;
+  camera.lens = choice<ear::LensModel>(from.lens, 2, "lens");
+  std::copy_n(from.distortion, 4, camera.distortion.begin());
+  camera.rate_hz = from.rate_hz;
+  return camera;
+}
+
+ear::EncoderCalibration encoder_of(const ear_calibration& from) {
+  ear::EncoderCalibration encoder;
+  encoder.T_BO = isometry_of(from.T_BO);
+  encoder.rate_hz = from.encoder_rate_hz;
+  encoder.resolution = from.counts_per_turn;
+  encoder.wraps = from.counts_wrap != 0;
+  encoder.wheel_radius = {from.wheel_radius[0], from.wheel_radius[1]};
+  encoder.wheel_separation = from.wheel_separation;
+  encoder.noise_counts = from.encoder_noise_counts;
+  return encoder;
+}
+
+ear::LaserCalibration lasers_of(const ear_calibration& from) {
+  ear::LaserCalibration lasers;
+  for (int i = 0; i < from.beam_count; ++i) {
+    lasers.beams.push_back({"beam" + std::to_string(i), vector_of(from.beams[i].p_BL), vector_of(from.beams[i].d_B)});
+  }
+  lasers.rate_hz = from.laser_rate_hz;
+  lasers.range_min = from.range_min;
+  lasers.range_max = from.range_max;
+  lasers.noise = from.laser_noise;
+  return lasers;
+}
+
+ear::Calibration calibration_of(const ear_calibration& from) {
+  require_count(from.camera_count, EAR_MAX_CAMERAS, "camera_count");
+  require_count(from.beam_count, EAR_MAX_BEAMS, "beam_count");
+  ear::Calibration calibration;
+  for (int i = 0; i < from.camera_count; ++i) calibration.cameras.push_back(camera_of(from.cameras[i]));
+  calibration.camera_time_offset = from.camera_time_offset;
+  calibration.imu = {from.imu_rate_hz, from.gyro_noise, from.gyro_random_walk, from.accel_noise,
+                     from.accel_random_walk};
+  if (from.has_encoder != 0) calibration.encoder = encoder_of(from);
+  if (from.beam_count > 0) calibration.lasers = lasers_of(from);
+  return calibration;
+}
+
+ear::Config config_of(const ear_settings& from) {
+  ear::Config config;
+  config.frontend.max_features = from.max_features;
+  config.filter.window = from.window;
+  config.filter.max_track_updates = from.max_track_updates;
+  config.filter.odometer.model = choice<ear::OdometerModel>(from.odometer, 4, "odometer");
+  config.filter.impact.accel_range = from.accel_range;
+  config.filter.impact.gyro_range = from.gyro_range;
+  return config;
+}
+
+ear::QueueCapacity capacity_of(const ear_settings& from) {
+  return {from.queue_seconds, static_cast<std::size_t>(std::max(from.frame_slots, 0))};
+}
+
+void write_state(const ear::NavState& from, ear_state& to) {
+  to.t_ns = from.t_ns;
+  to.q_WB[0] = from.q_WB.w();
+  to.q_WB[1] = from.q_WB.x();
+  to.q_WB[2] = from.q_WB.y();
+  to.q_WB[3] = from.q_WB.z();
+  Eigen::Vector3d::Map(to.p_WB) = from.p_WB;
+  Eigen::Vector3d::Map(to.v_W) = from.v_W;
+  Eigen::Vector3d::Map(to.b_g) = from.b_g;
+  Eigen::Vector3d::Map(to.b_a) = from.b_a;
+}
+
+void write_estimate(const ear::Estimate& from, ear_estimate& to) {
+  write_state(from.state, to.state);
+  for (int row = 0; row < ear::estimate_error::size; ++row) {
+    for (int column = 0; column < ear::estimate_error::size; ++column) {
+      to.covariance[row][column] = from.covariance(row, column);
+    }
+  }
+  to.terrain_known = from.terrain.known ? 1 : 0;
+  to.slope_along = from.terrain.slope_along;
+  to.slope_across = from.terrain.slope_across;
+  to.sigma_along = from.terrain.sigma_along;
+  to.sigma_across = from.terrain.sigma_across;
+  to.tracks = from.frame.tracks;
+  to.features_used = from.frame.features_used;
+  to.standing = from.frame.standing ? 1 : 0;
+  to.on_ground = from.frame.on_ground ? 1 : 0;
+}
+
+ear_result result_of(bool queued) { return queued ? EAR_OK : EAR_QUEUE_FULL; }
+
+ear::ImageView view_of(const std::uint8_t* data, const ear::CameraCalibration& camera, std::ptrdiff_t stride) {
+  return {data, camera.width, camera.height, stride};
+}
+
+}  // namespace
+
+extern "C" {
+
+const char* ear_result_text(ear_result result) {
+  switch (result) {
+    case EAR_OK:
+      return "success";
+    case EAR_NOTHING:
+      return "no frame is complete yet";
+    case EAR_NO_ESTIMATE:
+      return "there is no estimate";
+    case EAR_QUEUE_FULL:
+      return "the queue is full";
+    case EAR_INVALID_ARGUMENT:
+      return "invalid argument";
+    case EAR_OUT_OF_MEMORY:
+      return "out of memory";
+    case EAR_INTERNAL_ERROR:
+      return "internal error";
+  }
+  return "unknown result";
+}
+
+void ear_default_calibration(ear_calibration* calibration) {
+  if (calibration == nullptr) return;
+  *calibration = {};
+  for (ear_camera& camera : calibration->cameras) write_isometry(Eigen::Isometry3d::Identity(), camera.T_BC);
+  const ear::ImuCalibration imu;
+  calibration->imu_rate_hz = imu.rate_hz;
+  calibration->gyro_noise = imu.gyro_noise;
+  calibration->gyro_random_walk = imu.gyro_random_walk;
+  calibration->accel_noise = imu.accel_noise;
+  calibration->accel_random_walk = imu.accel_random_walk;
+  const ear::EncoderCalibration encoder;
+  write_isometry(encoder.T_BO, calibration->T_BO);
+  calibration->encoder_rate_hz = encoder.rate_hz;
+  calibration->counts_per_turn = encoder.resolution;
+  calibration->counts_wrap = encoder.wraps ? 1 : 0;
+  std::copy_n(encoder.wheel_radius.begin(), 2, calibration->wheel_radius);
+  calibration->wheel_separation = encoder.wheel_separation;
+  calibration->encoder_noise_counts = encoder.noise_counts;
+  for (ear_beam& beam : calibration->beams) Eigen::Vector3d::Map(beam.d_B) = ear::LaserBeam{}.d_B;
+  const ear::LaserCalibration lasers;
+  calibration->laser_rate_hz = lasers.rate_hz;
+  calibration->range_min = lasers.range_min;
+  calibration->range_max = lasers.range_max;
+  calibration->laser_noise = lasers.noise;
+}
+
+void ear_default_settings(ear_settings* settings) {
+  if (settings == nullptr) return;
+  const ear::Config config;
+  const ear::QueueCapacity capacity;
+  *settings = {};
+  settings->max_features = config.frontend.max_features;
+  settings->window = config.filter.window;
+  settings->max_track_updates = config.filter.max_track_updates;
+  settings->odometer = static_cast<ear_odometer_model>(config.filter.odometer.model);
+  settings->accel_range = config.filter.impact.accel_range;
+  settings->gyro_range = config.filter.impact.gyro_range;
+  settings->queue_seconds = capacity.seconds;
+  settings->frame_slots = static_cast<std::int32_t>(capacity.frame_slots);
+}
+
+ear_result ear_create(const ear_calibration* calibration, const ear_settings* settings, ear_odometry** odometry,
+                      char* message, size_t message_size) {
+  if (odometry != nullptr) *odometry = nullptr;
+  const auto create = [&] {
+    if (calibration == nullptr || odometry == nullptr) throw std::invalid_argument("a pointer is null");
+    ear_settings used;
+    ear_default_settings(&used);
+    if (settings != nullptr) used = *settings;
+    *odometry = new ear_odometry{{config_of(used), calibration_of(*calibration), capacity_of(used)}};
+    return EAR_OK;
+  };
+  return guarded(create, message, message_size);
+}
+
+void ear_destroy(ear_odometry* odometry) { delete odometry; }
+
+ear_result ear_add_imu(ear_odometry* odometry, const ear_imu_sample* sample) {
+  if (odometry == nullptr || sample == nullptr) return EAR_INVALID_ARGUMENT;
+  return result_of(odometry->queued.add_imu({sample->t_ns, vector_of(sample->gyro_B), vector_of(sample->accel_B)}));
+}
+
+ear_result ear_add_encoder(ear_odometry* odometry, const ear_encoder_sample* sample) {
+  if (odometry == nullptr || sample == nullptr) return EAR_INVALID_ARGUMENT;
+  return result_of(odometry->queued.add_encoder({sample->t_ns, sample->left_count, sample->right_count}));
+}
+
+ear_result ear_add_laser(ear_odometry* odometry, const ear_laser_sample* sample) {
+  if (odometry == nullptr || sample == nullptr) return EAR_INVALID_ARGUMENT;
+  ear::QueuedOdometry::Ranges ranges;
+  ranges.t_ns = sample->t_ns;
+  std::copy_n(sample->range, EAR_MAX_BEAMS, ranges.range.begin());
+  return result_of(odometry->queued.add_laser(ranges));
+}
+
+ear_result ear_add_stereo(ear_odometry* odometry, const ear_stereo_frame* frame) {
+  if (odometry == nullptr || frame == nullptr || frame->left == nullptr) return EAR_INVALID_ARGUMENT;
+  const std::vector<ear::CameraCalibration>& cameras = odometry->queued.cameras();
+  if (cameras.empty() || std::abs(frame->stride) < cameras.front().width) return EAR_INVALID_ARGUMENT;
+  ear::StereoFrame view;
+  view.t_ns = frame->t_ns;
+  view.left = view_of(frame->left, cameras.front(), frame->stride);
+  if (cameras.size() > 1 && frame->right != nullptr) view.right = view_of(frame->right, cameras[1], frame->stride);
+  return result_of(odometry->queued.add_stereo(view));
+}
+
+ear_result ear_process(ear_odometry* odometry, ear_estimate* estimate) {
+  return guarded([&] {
+    if (odometry == nullptr || estimate == nullptr) return EAR_INVALID_ARGUMENT;
+    std::optional<ear::Estimate> answer;
+    switch (odometry->queued.process(answer)) {
+      case ear::Progress::no_frame:
+        return EAR_NOTHING;
+      case ear::Progress::taken:
+        return EAR_NO_ESTIMATE;
+      case ear::Progress::estimated:
+        break;
+    }
+    write_estimate(*answer, *estimate);
+    return EAR_OK;
+  });
+}
+
+ear_result ear_step(ear_odometry* odometry, int64_t t_ns, ear_estimate* estimate) {
+  return guarded([&] {
+    if (odometry == nullptr || estimate == nullptr) return EAR_INVALID_ARGUMENT;
+    const std::optional<ear::Estimate> answer = odometry->queued.step(t_ns);
+    if (!answer) return EAR_NO_ESTIMATE;
+    write_estimate(*answer, *estimate);
+    return EAR_OK;
+  });
+}
+
+ear_result ear_predict(const ear_odometry* odometry, int64_t t_ns, ear_state* state) {
+  return guarded([&] {
+    if (odometry == nullptr || state == nullptr) return EAR_INVALID_ARGUMENT;
+    const std::optional<ear::NavState> answer = odometry->queued.odometry().predict(t_ns);
+    if (!answer) return EAR_NO_ESTIMATE;
+    write_state(*answer, *state);
+    return EAR_OK;
+  });
+}
+
+ear_status ear_status_of(const ear_odometry* odometry) {
+  if (odometry == nullptr) return EAR_WAITING_FOR_IMU;
+  switch (odometry->queued.odometry().status()) {
+    case ear::Status::waiting_for_imu:
+      return EAR_WAITING_FOR_IMU;
+    case ear::Status::waiting_for_standstill:
+      return EAR_WAITING_FOR_STANDSTILL;
+    case ear::Status::tracking:
+      return EAR_TRACKING;
+  }
+  return EAR_WAITING_FOR_IMU;
+}
+
+ear_result ear_counts_of(const ear_odometry* odometry, ear_counts* counts) {
+  return guarded([&] {
+    if (odometry == nullptr || counts == nullptr) return EAR_INVALID_ARGUMENT;
+    const ear::Overflows overflows = odometry->queued.overflows();
+    const ear::InputCounts inputs = odometry->queued.odometry().input_counts();
+    *counts = {};
+    counts->imu_overflow = overflows.imu;
+    counts->encoder_overflow = overflows.encoder;
+    counts->laser_overflow = overflows.laser;
+    counts->frame_overflow = overflows.frames;
+    counts->imu_rejected = inputs.imu_rejected;
+    counts->encoder_rejected = inputs.encoder_rejected;
+    counts->laser_rejected = inputs.laser_rejected;
+    counts->imu_spikes = inputs.imu_spikes;
+    counts->imu_gaps = inputs.imu_gaps;
+    counts->frames_rejected = inputs.frames_rejected;
+    counts->frames_without_imu = inputs.frames_without_imu;
+    return EAR_OK;
+  });
+}
+
+ear_result ear_reset(ear_odometry* odometry) {
+  return guarded([&] {
+    if (odometry == nullptr) return EAR_INVALID_ARGUMENT;
+    odometry->queued.reset();
+    return EAR_OK;
+  });
+}
+
+}  // extern "C"

@@ -1,0 +1,158 @@
+#include "src/queued_odometry.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+namespace ear {
+namespace {
+
+constexpr double kMinCapacity = 16.0;  // elements of a queue
+constexpr double kMaxSeconds = 60.0;
+constexpr std::size_t kMaxFrameSlots = 64;
+constexpr int kMaxImageSize = 16384;  // [px]
+
+void require(bool condition, const char* what) {
+  if (!condition) throw std::invalid_argument(what);
+}
+
+const Calibration& checked(const Calibration& calibration, const QueueCapacity& capacity) {
+  require(capacity.seconds > 0.0 && capacity.seconds <= kMaxSeconds, "queue_seconds: must be positive, at most 60");
+  require(capacity.frame_slots >= 1 && capacity.frame_slots <= kMaxFrameSlots, "frame_slots: 1 to 64");
+  for (const CameraCalibration& camera : calibration.cameras) {
+    require(camera.width > 0 && camera.height > 0 && camera.width <= kMaxImageSize && camera.height <= kMaxImageSize,
+            "calibration: a camera's width and height must be positive, at most 16384");
+  }
+  const auto is_rate = [](double hz) { return hz > 0.0 && hz <= 1e5; };
+  require(is_rate(calibration.imu.rate_hz), "calibration: the rate of the IMU must be positive, at most 100 kHz");
+  require(!calibration.encoder || is_rate(calibration.encoder->rate_hz),
+          "calibration: the rate of the encoders must be positive, at most 100 kHz");
+  require(!calibration.lasers || is_rate(calibration.lasers->rate_hz),
+          "calibration: the rate of the lasers must be positive, at most 100 kHz");
+  require(!calibration.lasers || calibration.lasers->beams.size() <= QueuedOdometry::kMaxBeams,
+          "calibration: at most three laser beams");
+  return calibration;
+}
+
+std::size_t elements(double seconds, double rate_hz) {
+  return static_cast<std::size_t>(std::max(kMinCapacity, std::ceil(seconds * rate_hz)));
+}
+
+std::size_t pixels(const Calibration& calibration, std::size_t camera) {
+  if (camera >= calibration.cameras.size()) return 0;
+  return static_cast<std::size_t>(calibration.cameras[camera].width) *
+         static_cast<std::size_t>(calibration.cameras[camera].height);
+}
+
+void copy_rows(const ImageView& from, std::vector<std::uint8_t>& to) {
+  const std::ptrdiff_t width = from.width;
+  for (std::ptrdiff_t row = 0; row < from.height; ++row) {
+    std::copy_n(from.data + row * from.stride, width, to.begin() + row * width);
+  }
+}
+
+ImageView view_of_rows(const std::vector<std::uint8_t>& rows, const CameraCalibration& camera) {
+  return {rows.data(), camera.width, camera.height, camera.width};
+}
+
+}  // namespace
+
+QueuedOdometry::QueuedOdometry(const Config& config, const Calibration& calibration, const QueueCapacity& capacity)
+    : odometry_(config, checked(calibration, capacity)),
+      cameras_(calibration.cameras),
+      camera_offset_ns_(std::llround(1e9 * calibration.camera_time_offset)),
+      imu_(elements(capacity.seconds, calibration.imu.rate_hz), {}),
+      encoder_(calibration.encoder ? elements(capacity.seconds, calibration.encoder->rate_hz) : 0, {}),
+      laser_(calibration.lasers ? elements(capacity.seconds, calibration.lasers->rate_hz) : 0, {}),
+      frames_(calibration.cameras.empty() ? 0 : capacity.frame_slots,
+              {0, std::vector<std::uint8_t>(pixels(calibration, 0)), std::vector<std::uint8_t>(pixels(calibration, 1)),
+               false}) {
+  if (calibration.lasers) laser_sample_.range.resize(calibration.lasers->beams.size());
+}
+
+bool QueuedOdometry::add_stereo(const StereoFrame& frame) {
+  Frame* const slot = frames_.queue.slot_to_fill();
+  if (slot == nullptr) {
+    frames_.overflows.fetch_add(1, std::memory_order_relaxed);
+    return false;
+  }
+  slot->t_ns = frame.t_ns;
+  copy_rows(frame.left, slot->left);
+  slot->has_right = cameras_.size() > 1 && !frame.right.empty();
+  if (slot->has_right) copy_rows(frame.right, slot->right);
+  frames_.queue.push();
+  return true;
+}
+
+StereoFrame QueuedOdometry::view_of(const Frame& frame) const {
+  StereoFrame view;
+  view.t_ns = frame.t_ns;
+  view.left = view_of_rows(frame.left, cameras_.front());
+  if (frame.has_right) view.right = view_of_rows(frame.right, cameras_[1]);
+  return view;
+}
+
+/// Up to and with the first inertial sample that is not earlier than `until_ns`: an interval ends between two samples.
+void QueuedOdometry::hand_over(TimeNs until_ns) {
+  constexpr TimeNs kNever = std::numeric_limits<TimeNs>::max();
+  const auto time_of = [](const auto* sample) { return sample == nullptr ? kNever : sample->t_ns; };
+  while (newest_imu_ns_ < until_ns) {
+    const ImuSample* const imu = imu_.queue.front();
+    const EncoderSample* const encoder = encoder_.queue.front();
+    const Ranges* const laser = laser_.queue.front();
+    const TimeNs earliest = std::min({time_of(imu), time_of(encoder), time_of(laser)});
+    if (imu != nullptr && imu->t_ns == earliest) {
+      odometry_.add_imu(*imu);
+      newest_imu_ns_ = std::max(newest_imu_ns_, imu->t_ns);
+      imu_.queue.pop();
+    } else if (encoder != nullptr && encoder->t_ns == earliest) {
+      odometry_.add_encoder(*encoder);
+      encoder_.queue.pop();
+    } else if (laser != nullptr) {
+      laser_sample_.t_ns = laser->t_ns;
+      std::copy_n(laser->range.begin(), laser_sample_.range.size(), laser_sample_.range.begin());
+      odometry_.add_laser(laser_sample_);
+      laser_.queue.pop();
+    } else {
+      return;  // nothing waits
+    }
+  }
+}
+
+Progress QueuedOdometry::process(std::optional<Estimate>& estimate) {
+  const Frame* const frame = frames_.queue.front();
+  if (frame == nullptr) {
+    hand_over(std::numeric_limits<TimeNs>::max());
+    return Progress::no_frame;
+  }
+  const TimeNs frame_ns = frame->t_ns + camera_offset_ns_;
+  hand_over(frame_ns);
+  if (newest_imu_ns_ < frame_ns && !frames_.queue.full()) return Progress::no_frame;
+  estimate = odometry_.add_stereo(view_of(*frame));
+  frames_.queue.pop();
+  return estimate ? Progress::estimated : Progress::taken;
+}
+
+std::optional<Estimate> QueuedOdometry::step(TimeNs t_ns) {
+  hand_over(t_ns);
+  return odometry_.step(t_ns);
+}
+
+void QueuedOdometry::reset() {
+  const auto drop_all = [](auto& inlet) {
+    while (inlet.queue.front() != nullptr) inlet.queue.pop();
+  };
+  drop_all(imu_);
+  drop_all(encoder_);
+  drop_all(laser_);
+  drop_all(frames_);
+  newest_imu_ns_ = std::numeric_limits<TimeNs>::min();
+  odometry_.reset();
+}
+
+Overflows QueuedOdometry::overflows() const {
+  const auto count = [](const auto& inlet) { return inlet.overflows.load(std::memory_order_relaxed); };
+  return {count(imu_), count(encoder_), count(laser_), count(frames_)};
+}
+
+}  // namespace ear

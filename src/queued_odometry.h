@@ -1,0 +1,105 @@
+// Odometry behind one bounded queue per sensor: the sensors' threads add, one thread estimates.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <vector>
+
+#include "ear/odometry.h"
+#include "src/sample_queue.h"
+
+namespace ear {
+
+/// How much waits at most for the thread that estimates.
+struct QueueCapacity {
+  double seconds = 2.0;         ///< [s] of samples of each sensor but the cameras, at the calibration's rates
+  std::size_t frame_slots = 4;  ///< stereo frames
+};
+
+/// Samples that were refused because their queue was full.
+struct Overflows {
+  std::uint64_t imu = 0, encoder = 0, laser = 0, frames = 0;
+};
+
+/// What became of the oldest frame.
+enum class Progress : std::uint8_t {
+  no_frame,  ///< none is complete
+  taken,     ///< the estimator refused it, or has not started
+  estimated
+};
+
+class QueuedOdometry {
+ public:
+  static constexpr std::size_t kMaxBeams = 3;
+
+  /// One reading of the beams, in a form that owns no memory; as LaserSample.
+  struct Ranges {
+    TimeNs t_ns = 0;
+    std::array<double, kMaxBeams> range{};
+  };
+
+  /// Throws std::invalid_argument, naming the field.
+  QueuedOdometry(const Config& config, const Calibration& calibration, const QueueCapacity& capacity);
+
+  /// Each by one thread. False: the queue is full; the sample is counted.
+  bool add_imu(const ImuSample& sample) { return add(imu_, sample); }
+  bool add_encoder(const EncoderSample& sample) { return add(encoder_, sample); }
+  bool add_laser(const Ranges& ranges) { return add(laser_, ranges); }
+  /// Copies the images, which have the size in the calibration.
+  bool add_stereo(const StereoFrame& frame);
+
+  /// All that follows belongs to the thread that estimates. Hands over what waits, ordered by time, up to the oldest
+  /// frame, and that frame once inertial samples reach it or all slots are taken.
+  Progress process(std::optional<Estimate>& estimate);
+  std::optional<Estimate> step(TimeNs t_ns);
+  void reset();
+
+  [[nodiscard]] const Odometry& odometry() const { return odometry_; }
+  /// By any thread.
+  [[nodiscard]] const std::vector<CameraCalibration>& cameras() const { return cameras_; }
+  [[nodiscard]] Overflows overflows() const;
+
+ private:
+  template <typename T>
+  struct Inlet {
+    SampleQueue<T> queue;
+    std::atomic<std::uint64_t> overflows{0};
+
+    Inlet(std::size_t capacity, const T& element) : queue(capacity, element) {}
+  };
+  struct Frame {
+    TimeNs t_ns = 0;
+    std::vector<std::uint8_t> left, right;  ///< rows without gaps
+    bool has_right = false;
+  };
+
+  template <typename T>
+  static bool add(Inlet<T>& inlet, const T& sample) {
+    T* const slot = inlet.queue.slot_to_fill();
+    if (slot == nullptr) {
+      inlet.overflows.fetch_add(1, std::memory_order_relaxed);
+      return false;
+    }
+    *slot = sample;
+    inlet.queue.push();
+    return true;
+  }
+
+  [[nodiscard]] StereoFrame view_of(const Frame& frame) const;
+  void hand_over(TimeNs until_ns);
+
+  Odometry odometry_;
+  std::vector<CameraCalibration> cameras_;
+  TimeNs camera_offset_ns_;  ///< added to a camera's stamp gives IMU time
+  Inlet<ImuSample> imu_;
+  Inlet<EncoderSample> encoder_;
+  Inlet<Ranges> laser_;
+  Inlet<Frame> frames_;
+  LaserSample laser_sample_;  ///< reused
+  TimeNs newest_imu_ns_ = std::numeric_limits<TimeNs>::min();
+};
+
+}  // namespace ear
