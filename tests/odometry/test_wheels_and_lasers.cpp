@@ -26,6 +26,8 @@ struct Errors {
   double slope = 0.0;     ///< RMS of both angles [rad]
   double inside = 0.0;    ///< share of the slopes within three standard deviations
   double mode = 0.0;      ///< share of the estimates that know whether the vehicle is on the ground
+  double start = 0.0;     ///< first estimate, since the first frame [s]
+  double gap = 0.0;       ///< longest between two estimates [s]
 };
 
 Errors run(const simulator::Simulation& simulation, OdometerModel model,
@@ -37,6 +39,11 @@ Errors run(const simulator::Simulation& simulation, OdometerModel model,
   Errors errors;
   double slopes = 0.0;
   const auto estimates = test::run_filter(filter, simulation, change);
+  REQUIRE(!estimates.empty());
+  errors.start = estimates.front().t;
+  for (std::size_t i = 1; i < estimates.size(); ++i) {
+    errors.gap = std::max(errors.gap, estimates[i].t - estimates[i - 1].t);
+  }
   for (const test::EvaluatedEstimate& e : estimates) {
     errors.position += e.dp_W.squaredNorm();
     const simulator::Truth truth = simulation.truth(e.estimate.state.t_ns);
@@ -50,7 +57,6 @@ Errors run(const simulator::Simulation& simulation, OdometerModel model,
     errors.inside += std::abs(across) < 3.0 * ground.sigma_across ? 1.0 : 0.0;
     slopes += 2.0;
   }
-  REQUIRE(!estimates.empty());
   const auto count = static_cast<double>(estimates.size());
   errors.position = std::sqrt(errors.position / count);
   errors.end = estimates.back().dp_W.norm();
@@ -92,6 +98,40 @@ TEST_CASE("wheels and lasers: with the lens covered they carry on") {
   };
   CHECK(run(simulation, OdometerModel::terrain, cover).position < 0.2);
   CHECK(run(simulation, OdometerModel::none, cover).position > 1.0);
+}
+
+TEST_CASE("wheels and lasers: with the lens covered from the beginning they start, and find the way") {
+  const simulator::Simulation simulation = simulate("flat1", 818, 40.0);
+  const Errors errors = run(simulation, OdometerModel::terrain, [](FeatureFrame& frame) { frame.features.clear(); });
+  CHECK(errors.start < 1.5);
+  CHECK(errors.gap < 0.1);
+  CHECK(errors.position < 0.3);
+}
+
+TEST_CASE("wheels and lasers: five seconds without a frame are bridged at 20 Hz") {
+  simulator::Options options;
+  options.sequence = "flat1";
+  options.seed = 819;
+  options.duration = 25.0;
+  const double clean = run(simulator::Simulation(options), OdometerModel::terrain).position;
+  options.faults = {simulator::parse_fault("camera_dropped@10+5")};
+  const Errors errors = run(simulator::Simulation(options), OdometerModel::terrain);
+  CHECK(errors.gap > 0.1);
+  CHECK(errors.gap < 0.25);
+  CHECK(errors.position < 0.04);
+  CHECK(errors.position < 3.0 * clean);
+}
+
+TEST_CASE("wheels and lasers: at five frames a second they lose nothing") {
+  simulator::Options options;
+  options.sequence = "flat3";
+  options.seed = 820;
+  options.duration = 40.0;
+  const double fast = run(simulator::Simulation(options), OdometerModel::terrain).position;
+  options.camera_rate_hz = 5.0;
+  const double slow = run(simulator::Simulation(options), OdometerModel::terrain).position;
+  CHECK(slow < 0.04);
+  CHECK(slow < 2.0 * fast);
 }
 
 TEST_CASE("wheels and lasers: pre-integrated displacements do in place of velocities, in the dark too") {
