@@ -50,6 +50,10 @@ void Covariance::restart(int first, const Eigen::Ref<const Eigen::VectorXd>& sig
   P_.diagonal().segment(first, count) = sigma.cwiseAbs2();
 }
 
+void Covariance::widen(int first, const Eigen::Ref<const Eigen::VectorXd>& sigma) {
+  P_.diagonal().segment(first, sigma.size()) += sigma.cwiseAbs2();
+}
+
 double Covariance::variance(const Eigen::Ref<const Eigen::RowVectorXd>& h, int first_column) const {
   const auto n = h.size();
   double sum = 0.0;

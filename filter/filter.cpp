@@ -16,6 +16,8 @@ namespace {
 constexpr std::size_t kImuCapacity = 4096;   // 20 s at 200 Hz, 4 s at 1 kHz
 constexpr std::size_t kWheelCapacity = 512;  // readings that wait for the state to pass them
 constexpr double kSpinUp = 0.1;              // [s] after a touchdown until the wheels roll
+constexpr double kTakeoffVelocity = 0.05;    // [m/s] what the odometer was wrong by before a take-off was noticed
+constexpr double kTakeoffPosition = 5e-3;    // [m] what came of it
 constexpr double kDoubtTime = 0.5;           // [s] the contradiction of two wheels is one error so long
 constexpr double kSlipEnds = 0.15;           // [s] of agreement before a row that failed its gate is used again
 constexpr double kRollingWindow = 2.0;       // [s] of samples kept for a start while rolling
@@ -182,9 +184,14 @@ void Filter::mend_spike(const ImuSample& next) {
   ++counts_.imu_spikes;
 }
 
-/// After a change of the ground under the wheels nothing is known of it.
+/// After a change of the ground under the wheels nothing is known of it. A take-off is noticed some centimetres above
+/// the ground, and until then the odometer held the vehicle there.
 void Filter::note_contact(ContactEvent event) {
-  if (event != ContactEvent::none) ground_known_ = false;
+  if (event == ContactEvent::none) return;
+  ground_known_ = false;
+  if (event != ContactEvent::takeoff || status_ != Status::tracking) return;
+  covariance_.widen(err::nu, Eigen::Vector3d::Constant(kTakeoffVelocity));
+  covariance_.widen(err::rho, Eigen::Vector3d::Constant(kTakeoffPosition));
 }
 
 /// Do the wheels tell how the vehicle moves? Not in the air, and not while they are spun up by the ground.

@@ -124,7 +124,7 @@ double share_in_band(const std::vector<Nees>& runs, const std::vector<double> Ne
 /// Average over all cases and both quantities; `shares` takes each.
 double measure(std::uint64_t first_seed, std::vector<double>& shares) {
   constexpr std::array kCases = {Case{"flat1", false, false}, Case{"flat1", true, false}, Case{"fly1", false, false},
-                                 Case{"fly1", true, false}, Case{"flat1", false, true}};
+                                 Case{"fly1", true, false},   Case{"flat1", false, true}, Case{"fly1", false, true}};
   double total = 0.0;
   for (const Case& setup : kCases) {
     MESSAGE(
