@@ -126,6 +126,17 @@ TEST_CASE("covariance: what is only considered keeps value and variance, the res
   CHECK((considered.matrix() - (I_KH * before * I_KH.transpose() + K * K.transpose())).norm() < 1e-9);
 }
 
+TEST_CASE("covariance: what is widened keeps its correlations") {
+  std::mt19937_64 rng{36};
+  Covariance P = filled(rng);
+  const Eigen::MatrixXd before = P.matrix();
+  P.widen(err::nu, Eigen::Vector3d(0.1, 0.2, 0.3));
+  Eigen::MatrixXd added = P.matrix() - before;
+  CHECK((added.diagonal().segment<3>(err::nu) - Eigen::Vector3d(0.01, 0.04, 0.09)).norm() < 1e-12);
+  added.diagonal().segment<3>(err::nu).setZero();
+  CHECK(added.norm() == 0.0);
+}
+
 TEST_CASE("covariance: rows that are not numbers change nothing") {
   std::mt19937_64 rng{35};
   Covariance P = filled(rng);
