@@ -41,6 +41,8 @@ struct Arguments {
   evaluation::AlignmentKind alignment = evaluation::AlignmentKind::yaw;
   std::optional<double> duration;
   std::vector<std::string> faults;
+  double track_sigma_px = simulator::Options{}.track.sigma_px;
+  bool perfect_sensors = false;
   int threads = 2;
   bool json = false;
 };
@@ -82,6 +84,8 @@ std::vector<simulator::Options> simulations_of(const Arguments& args) {
         options.seed = seed;
         options.camera_rate_hz = rate;
         options.duration = args.duration;
+        options.track.sigma_px = args.track_sigma_px;
+        options.sensor_noise = !args.perfect_sensors;
         for (const std::string& fault : args.faults) options.faults.push_back(simulator::parse_fault(fault));
         simulations.push_back(options);
       }
@@ -202,6 +206,11 @@ int parse_and_run(int argc, char** argv) {
       ->default_str("yaw");
   app.add_option("--duration", args.duration, "[s] stop earlier");
   app.add_option("--fault", args.faults, "what goes wrong, as in ear simulate; may be repeated");
+  app.add_option("--track-sigma", args.track_sigma_px, "[px] noise of the tracks: small for the bound that they set")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  app.add_flag("--perfect-sensors", args.perfect_sensors,
+               "IMU without noise and biases, encoders and lasers without noise and faults");
   app.add_option("--threads", args.threads, "the figures do not depend on it")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
