@@ -639,8 +639,8 @@ void Filter::update_with_beams(const BeamRanges& reading) {
   const Motion motion = motion_at(reading.t_ns);
   if (!ground_known_) restart_ground(reading, motion.R_WB);
   const double sigma = std::hypot(lasers.noise, config_.odometer.unevenness);
-  Eigen::Matrix<double, kMaxBeams, kGroundColumns> H = Eigen::Matrix<double, kMaxBeams, kGroundColumns>::Zero();
-  Eigen::Matrix<double, kMaxBeams, 1> r;
+  Eigen::Matrix<double, kMaxBeams + 1, kGroundColumns> H;
+  Eigen::Matrix<double, kMaxBeams + 1, 1> r;
   int count = 0;
   for (int i = 0; i < beam_count_; ++i) {
     const auto beam = static_cast<std::size_t>(i);
@@ -659,6 +659,15 @@ void Filter::update_with_beams(const BeamRanges& reading) {
     ++statistics_.beams_used;
     h /= sigma;
     r(count++) = residual / sigma;
+  }
+  const AxlePrediction axle = predict_axle(state_, motion.R_WB);
+  const double axle_sigma = std::sqrt(2.0) * config_.odometer.unevenness / state_.odometer.wheel_separation;
+  auto h = H.row(count);
+  h.setZero();
+  h.segment<2>(ground_column(err::normal)) = axle.H_normal;
+  if (axle.lean * axle.lean <= gate_(1) * (covariance_.variance(h, err::nu) + axle_sigma * axle_sigma)) {
+    h /= axle_sigma;
+    r(count++) = -axle.lean / axle_sigma;
   }
   if (count > 0) update(H.topRows(count), err::nu, r.head(count));
 }

@@ -53,6 +53,13 @@ Slope slope(const Eigen::Vector3d& y_W, const Eigen::Vector3d& n_W) {
   return result;
 }
 
+namespace {
+/// Derivative of the normal, in the body, by its error.
+Eigen::Matrix<double, 3, 2> normal_by_error(const State& x, const Eigen::Matrix3d& R_WB, const Eigen::Vector3d& n_B) {
+  return -skew(n_B) * R_WB.transpose() * tangent_basis(x.ground.n_W);
+}
+}  // namespace
+
 BeamPrediction predict_range(const State& x, const Eigen::Matrix3d& R_WB, std::size_t beam,
                              const Eigen::Vector3d& p_BL) {
   const Eigen::Vector3d n_B = R_WB.transpose() * x.ground.n_W;
@@ -63,11 +70,16 @@ BeamPrediction predict_range(const State& x, const Eigen::Matrix3d& R_WB, std::s
   z.range = -(x.odometer.wheel_radius.mean() + n_B.dot(from_O)) / slant;
 
   const Eigen::RowVector3d J_n = -(from_O + z.range * d_B).transpose() / slant;
-  const Eigen::Matrix<double, 3, 2> n_delta = -skew(n_B) * R_WB.transpose() * tangent_basis(x.ground.n_W);
-  z.H_normal = J_n * n_delta;
+  z.H_normal = J_n * normal_by_error(x, R_WB, n_B);
   const Eigen::Vector3d axis = tilt_axis(d_B, x.odometer.T_BO.R.col(2));
   z.H_tilt = -z.range / slant * n_B.dot(axis.cross(d_B));
   return z;
+}
+
+AxlePrediction predict_axle(const State& x, const Eigen::Matrix3d& R_WB) {
+  const Eigen::Vector3d n_B = R_WB.transpose() * x.ground.n_W;
+  const Eigen::Vector3d y_B = x.odometer.T_BO.R.col(1);
+  return {y_B.dot(n_B), y_B.transpose() * normal_by_error(x, R_WB, n_B)};
 }
 
 }  // namespace ear

@@ -46,4 +46,12 @@ struct BeamPrediction {
 [[nodiscard]] BeamPrediction predict_range(const State& x, const Eigen::Matrix3d& R_WB, std::size_t beam,
                                            const Eigen::Vector3d& p_BL);
 
+/// Both wheels stand on the ground, so the axle lies along it: 0 = lean + H_normal delta, lean = y_B . n_B.
+struct AxlePrediction {
+  double lean = 0.0;  ///< sine of the axle's angle to the ground
+  Eigen::RowVector2d H_normal = Eigen::RowVector2d::Zero();
+};
+
+[[nodiscard]] AxlePrediction predict_axle(const State& x, const Eigen::Matrix3d& R_WB);
+
 }  // namespace ear

@@ -46,6 +46,15 @@ TEST_CASE("ground: nose-down brings the ground closer to the front beams") {
   CHECK(predict_range(x, x.imu.R_WB, 2, three_beams()[2].p_BL).range > 0.105 + 0.005);
 }
 
+TEST_CASE("ground: the axle of a vehicle that stands on its right wheel leans to the left of the ground") {
+  // Rolled about x, the left wheel up: y points up from the floor.
+  const State up = on_plane(Eigen::Vector3d::UnitZ(), exp_so3({0.1, 0.0, 0.0}));
+  CHECK(predict_axle(up, up.imu.R_WB).lean == doctest::Approx(std::sin(0.1)));
+  // On a floor that rises to the left by as much it stands on both.
+  const State along = on_plane({0.0, -std::sin(0.1), std::cos(0.1)}, exp_so3({0.1, 0.0, 0.0}));
+  CHECK(std::abs(predict_axle(along, along.imu.R_WB).lean) < 1e-12);
+}
+
 TEST_CASE("ground: the plane through the predicted hits is the plane") {
   std::mt19937_64 rng{61};
   for (int i = 0; i < 20; ++i) {
@@ -125,6 +134,16 @@ TEST_CASE("ground: Jacobians are the derivatives") {
       };
       check_jacobian(range, H);
     }
+    Eigen::MatrixXd H_axle = Eigen::MatrixXd::Zero(1, err::camera);
+    H_axle.block<1, 2>(0, err::normal) = predict_axle(x, x.imu.R_WB).H_normal;
+    const auto lean = [&](const Eigen::VectorXd& part) -> Eigen::VectorXd {
+      Eigen::VectorXd d = Eigen::VectorXd::Zero(x.error_size());
+      d.head(part.size()) = part;
+      d.segment<3>(err::odometer).setZero();  // part of the noise: unevenness under the wheels is far larger
+      const State moved = boxplus(x, d);
+      return Eigen::VectorXd::Constant(1, predict_axle(moved, moved.imu.R_WB).lean);
+    };
+    check_jacobian(lean, H_axle);
     const Eigen::Vector3d y_B = x.odometer.T_BO.R.col(1);
     const auto slopes = [&](const Eigen::VectorXd& part) -> Eigen::VectorXd {
       Eigen::VectorXd d = Eigen::VectorXd::Zero(x.error_size());
