@@ -78,6 +78,7 @@ LinearizedObservation linearize_observation(const State& x, int clone, int camer
   const double w = 1.0 / h.z();
   LinearizedObservation z;
   z.clone = clone;
+  z.noise = x.clones[static_cast<std::size_t>(clone)].feature_noise;
   z.residual = uv - h.head<2>() * w;
   Eigen::Matrix<double, 2, 3> J_C;  // d uv / d h
   J_C << w, 0.0, -h.x() * w * w, 0.0, w, -h.y() * w * w;
@@ -131,8 +132,9 @@ bool FeatureInformation::add_gated(const std::vector<LinearizedObservation>& obs
   double cost = 0.0;
   weights_.clear();
   for (const LinearizedObservation& z : observations) {
-    const double distance = z.residual.norm() / sigma;
-    const double w = (distance > huber ? huber / distance : 1.0) / (sigma * sigma);  // Huber's, and whitening
+    const double sigma_z = sigma * z.noise;
+    const double distance = z.residual.norm() / sigma_z;
+    const double w = (distance > huber ? huber / distance : 1.0) / (sigma_z * sigma_z);  // Huber's, and whitening
     weights_.push_back(w);
     V.noalias() += w * z.H_f.transpose() * z.H_f;
     v.noalias() += w * z.H_f.transpose() * z.residual;

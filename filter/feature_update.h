@@ -23,6 +23,7 @@ struct LinearizedObservation {
   Eigen::Matrix<double, 2, 12> H_calibration;  ///< phi, p of camera 0 in B; phi, p of camera 1 in camera 0
   Eigen::Matrix<double, 2, err::clone_size> H_clone;
   Eigen::Matrix<double, 2, 3> H_f;  ///< feature times its inverse depth, world axes
+  double noise = 1.0;               ///< its standard deviation, times that of all observations
 };
 
 /// Poses of both cameras for every clone: index 2 * clone + camera.

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "filter/displacement_update.h"
+#include "filter/displacements.h"
 #include "filter/ground.h"
 #include "filter/rolling_start.h"
 
@@ -35,6 +36,7 @@ constexpr double kStartGravityNoise = 0.02;    // [m/s^2] what idling rotors lea
 constexpr double kKnownSigma = 1e-6;           // [m, rad] of position and yaw at the start: by definition zero
 constexpr double kUnknownTilt = 0.3;           // [rad] before gravity was measured
 constexpr double kCommonShare = 0.5;           // of its features, that the elder of a copy must have seen
+constexpr std::size_t kMaxCompared = 512;      // features of a frame whose motion is compared with other sensors
 constexpr std::size_t kMinObservations = 2;    // clones that must have seen a feature
 
 int error_capacity(const FilterConfig& config) { return err::clone(config.window + 1); }
@@ -50,6 +52,10 @@ const FilterConfig& checked(const FilterConfig& config) {
   require(config.feature_sigma_px > 0.0, "filter.feature_sigma_px: must be positive");
   require(config.huber_px > 0.0, "filter.huber_px: must be positive");
   require(config.gate_probability > 0.0 && config.gate_probability < 1.0, "filter.gate_probability: between 0 and 1");
+  const AnomalyConfig& anomaly = config.anomaly;
+  require(anomaly.distance > 0.0, "filter.anomaly.distance: must be positive");
+  require(anomaly.false_alarm > 0.0 && anomaly.false_alarm < 1.0, "filter.anomaly.false_alarm: between 0 and 1");
+  require(anomaly.min_weight > 0.0 && anomaly.min_weight <= 1.0, "filter.anomaly.min_weight: above 0, at most 1");
   return config;
 }
 
@@ -128,6 +134,8 @@ Filter::Filter(const FilterConfig& config, const Calibration& calibration)
       displacement_turns_(kWheelCapacity),
       contact_(config.contact, calibration),
       standstill_(config.standstill, focal_px_),
+      consistency_check_(config.anomaly),
+      camera_displacement_(config.feature_sigma_px / focal_px_, kMaxCompared),
       information_(config.window + 1, config.max_track_updates) {
   state_.camera = camera_state(calibration);
   state_.odometer = odometer_state(calibration);
@@ -309,6 +317,7 @@ bool Filter::begin_frame(const FeatureFrame& frame) {
   any_frame_ = true;
   last_frame_ns_ = frame.t_ns;
   statistics_ = FrameStatistics{};
+  consistency_ = Consistency{};
   statistics_.tracks = static_cast<int>(frame.features.size());
   statistics_.stereo = static_cast<int>(std::count_if(frame.features.begin(), frame.features.end(),
                                                       [](const FeatureObservation& f) { return f.has_right; }));
@@ -321,8 +330,49 @@ bool Filter::begin_frame(const FeatureFrame& frame) {
                                         on_ground() ? wheel_rest_.duration(t_ns, kWheelAge) : std::nullopt);
   contact_.set_gyro_bias(state_.imu.b_g);
   statistics_.on_ground = on_ground();
+  if (started) compare_sensors(frame, t_ns);
   if (started || try_start(t_ns, imu, still) || try_rolling_start()) advance_measuring(t_ns);
   return still;
+}
+
+/// Before anything of the interval up to t_ns is used: how far the body goes in it, told by each sensor alone.
+void Filter::compare_sensors(const FeatureFrame& frame, TimeNs t_ns) {
+  const ImuMotion motion = imu_motion(state_.imu, imu_, t_ns, calibration_.imu, impact_guard_);
+  Displacements displacements;
+  displacements[index_of(MotionSensor::imu)] = imu_displacement(motion, covariance_);
+  displacements[index_of(MotionSensor::odometer)] = displacement_by_wheels(t_ns);
+  if (state_.imu.t_ns != compared_ns_) camera_displacement_.clear();  // the frame before was not where the state is
+  const double bias = motion.duration * motion.duration * covariance_.matrix().diagonal().segment<3>(err::b_g).maxCoeff();
+  displacements[index_of(MotionSensor::camera)] =
+      camera_displacement_.add(frame, state_.camera, motion.R_BiBj, motion.rotation_variance + bias);
+  compared_ns_ = t_ns;
+  consistency_ = consistency_check_(displacements);
+}
+
+Displacement Filter::displacement_by_wheels(TimeNs until_ns) const {
+  const bool terrain = config_.odometer.model == OdometerModel::terrain && beam_count_ > 0;
+  if (!encoder_ || !rolls_at(state_.imu.t_ns) || (terrain && !ground_known_)) return {};
+  const WheelSetting setting{wheel_model(state_.odometer), wheel_noise(), config_.odometer.speed_sigma,
+                             config_.odometer.side_slip_turn, terrain};
+  return wheel_displacement(state_, covariance_, TurnsBetween(passed_turn_, turns_), imu_, until_ns, setting);
+}
+
+WheelNoise Filter::wheel_noise() const {
+  const OdometerConfig& odometer = config_.odometer;
+  const EncoderCalibration& encoder = *calibration_.encoder;
+  WheelNoise noise;
+  noise.gyro = calibration_.imu.gyro_noise;
+  noise.reading = encoder.noise_counts * 2.0 * M_PI / static_cast<double>(encoder.resolution);
+  noise.slip = odometer.slip;
+  noise.side_slip = odometer.side_slip;
+  noise.roughness = odometer.roughness;
+  noise.normal_walk = odometer.normal_walk;
+  return noise;
+}
+
+/// Factor on the inverse standard deviation of what the sensor says about the interval at hand.
+double Filter::trust(MotionSensor sensor) const {
+  return config_.anomaly.enabled && consistency_.anomalous == sensor ? consistency_.weight[index_of(sensor)] : 1.0;
 }
 
 /// Standing: the mean specific force is gravity, the mean rate is the gyroscope's bias.
@@ -410,7 +460,7 @@ void Filter::advance(TimeNs t_ns) {
                         ImuCalibration noise = calibration_.imu;
                         const ImuNoiseFactors factors = impact_guard_.add({state_.imu.t_ns, gyro_B, accel_B});
                         noise.gyro_noise *= factors.gyro;
-                        noise.accel_noise *= factors.accel;
+                        noise.accel_noise *= factors.accel / trust(MotionSensor::imu);
                         if (dt > config_.max_imu_gap) {
                           noise.gyro_noise *= kGapNoiseFactor;
                           noise.accel_noise *= kGapNoiseFactor;
@@ -443,6 +493,7 @@ void Filter::advance_measuring(TimeNs t_ns) {
       } else {
         displacement_.reset();
       }
+      passed_turn_ = turns_.front();
       turns_.pop();
     } else {
       update_with_beams(ranges_.front());
@@ -521,8 +572,9 @@ void Filter::update_with_wheels(const WheelTurn& turn) {
       continue;
     }
     ++statistics_.wheel_rows_used;
-    H.row(count) = rows.H.row(row) / sigma(row);
-    r(count++) = rows.residual(row) / sigma(row);
+    const double weight = trust(MotionSensor::odometer) / sigma(row);
+    H.row(count) = weight * rows.H.row(row);
+    r(count++) = weight * rows.residual(row);
   }
   if (count > 0) update(H.topRows(count), err::nu, r.head(count));
 }
@@ -566,16 +618,7 @@ bool Filter::choose_wheels(WheelRows& rows, Eigen::Vector4d& sigma, const WheelT
 void Filter::start_displacement() {
   displacement_.reset();
   if (!on_ground() || !ground_known_ || config_.odometer.update != OdometerUpdate::displacement) return;
-  const OdometerConfig& odometer = config_.odometer;
-  const EncoderCalibration& encoder = *calibration_.encoder;
-  WheelNoise noise;
-  noise.gyro = calibration_.imu.gyro_noise;
-  noise.reading = encoder.noise_counts * 2.0 * M_PI / static_cast<double>(encoder.resolution);
-  noise.slip = odometer.slip;
-  noise.side_slip = odometer.side_slip;
-  noise.roughness = odometer.roughness;
-  noise.normal_walk = odometer.normal_walk;
-  displacement_.emplace(wheel_model(state_.odometer), noise);
+  displacement_.emplace(wheel_model(state_.odometer), wheel_noise());
   displacement_->start(state_.imu.R_WB.transpose() * state_.ground.n_W, state_.imu.b_g);
   displacement_ns_ = state_.imu.t_ns;
 }
@@ -630,7 +673,8 @@ void Filter::update_with_displacement() {
     return;
   }
   statistics_.wheel_rows_used += 3;
-  update(H, 0, r);
+  const double weight = trust(MotionSensor::odometer);
+  update(weight * H, 0, weight * r);
 }
 
 void Filter::update_with_beams(const BeamRanges& reading) {
@@ -718,7 +762,7 @@ void Filter::append_clone() {
   Eigen::Matrix<double, 6, 1> J_offset;  // the frame was taken a moment later than thought: the vehicle moved on
   J_offset << rate_W, x.v_W + x.p_WB.cross(rate_W);
   covariance_.append_clone(J_imu, J_offset);
-  state_.clones.push_back({next_frame_++, {x.R_WB, x.p_WB}});
+  state_.clones.push_back({next_frame_++, {x.R_WB, x.p_WB}, 1.0 / trust(MotionSensor::camera)});
   learn_calibration_ = true;
   clone_is_here_ = true;
 }
@@ -867,6 +911,7 @@ Estimate Filter::make_estimate() const {
   T.block<3, 3>(estimate_error::position, err::theta) = -skew(x.p_WB);
   estimate.covariance = T * covariance_.matrix().topLeftCorner<err::imu_size, err::imu_size>() * T.transpose();
   estimate.frame = statistics_;
+  estimate.consistency = consistency_;
   if (ground_known_) {
     const Slope ground = slope(x.R_WB * state_.odometer.T_BO.R.col(1), state_.ground.n_W);
     constexpr std::array<int, 5> kEntries = {err::theta, err::theta + 1, err::theta + 2, err::normal, err::normal + 1};

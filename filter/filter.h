@@ -14,7 +14,9 @@
 #include "ear/filter_config.h"
 #include "ear/odometry.h"
 #include "ear/types.h"
+#include "filter/camera_displacement.h"
 #include "filter/chi_squared.h"
+#include "filter/consistency.h"
 #include "filter/contact.h"
 #include "filter/covariance.h"
 #include "filter/feature_update.h"
@@ -91,6 +93,10 @@ class Filter {
   bool try_rolling_start();
   [[nodiscard]] Eigen::VectorXd start_sigma() const;
   bool begin_frame(const FeatureFrame& frame);
+  void compare_sensors(const FeatureFrame& frame, TimeNs t_ns);
+  [[nodiscard]] Displacement displacement_by_wheels(TimeNs until_ns) const;
+  [[nodiscard]] WheelNoise wheel_noise() const;
+  [[nodiscard]] double trust(MotionSensor sensor) const;
   void advance(TimeNs t_ns);
   void advance_measuring(TimeNs t_ns);
   [[nodiscard]] Motion motion_at(TimeNs t_ns) const;
@@ -131,8 +137,9 @@ class Filter {
   ImpactGuard impact_guard_;
   Eigen::Vector3d rate_B_ = Eigen::Vector3d::Zero();  ///< mean rate of the last piece integrated, bias removed [rad/s]
   std::optional<EncoderReader> encoder_;
-  Ring<WheelTurn> turns_;    ///< not yet passed by the state
-  Ring<BeamRanges> ranges_;  ///< the same
+  Ring<WheelTurn> turns_;                 ///< not yet passed by the state
+  Ring<BeamRanges> ranges_;               ///< the same
+  std::optional<WheelTurn> passed_turn_;  ///< the last one that was
   TimeNs last_range_ns_ = 0;
   bool ground_known_ = false;                        ///< the lasers saw the ground since it was last touched
   std::optional<WheelPreintegration> displacement_;  ///< since the newest clone
@@ -154,6 +161,10 @@ class Filter {
   bool clone_is_here_ = false;      ///< the newest clone was made where the vehicle is, if it stands
   bool learn_calibration_ = false;  ///< standing tells nothing about it
   FrameStatistics statistics_;
+  ConsistencyCheck consistency_check_;
+  CameraDisplacement camera_displacement_;
+  Consistency consistency_;  ///< over the interval that ends with the frame at hand
+  TimeNs compared_ns_ = 0;   ///< where that ends
 
   FeatureInformation information_;
   std::vector<CameraPose> cameras_;

@@ -93,6 +93,28 @@ struct ImpactConfig {
   double gyro_range = 0.0;        ///< [rad/s]
 };
 
+/// What is measured of the sensors' disagreement about how far the vehicle went.
+enum class AnomalyScore : std::uint8_t {
+  distance,    ///< the paper's: lengths, whatever the interval between frames
+  mahalanobis  ///< lengths over the standard deviations that the two displacements should have
+};
+
+/// How the weight of the sensor at fault follows from the distances between the displacements.
+enum class AnomalyWeight : std::uint8_t {
+  symmetric,  ///< the others' distance over each of its own, the same for every sensor
+  printed     ///< (15) as the paper prints it
+};
+
+/// Sensors compared over every interval between frames: the paper's III-D; docs/anomaly.md.
+struct AnomalyConfig {
+  bool enabled = true;  ///< weigh down the one at fault
+  AnomalyScore score = AnomalyScore::mahalanobis;
+  AnomalyWeight weight = AnomalyWeight::symmetric;
+  double distance = 0.01;     ///< [m] with `distance`: root of the variance (13) that is too much
+  double false_alarm = 1e-4;  ///< with `mahalanobis`: probability of an alarm about sensors that are right
+  double min_weight = 0.05;   ///< of the sensor at fault
+};
+
 struct FilterConfig {
   int window = 12;                     ///< clones kept
   int max_track_updates = 40;          ///< features used per frame, those with most observations first
@@ -107,6 +129,7 @@ struct FilterConfig {
   OdometerConfig odometer;
   ContactConfig contact;
   ImpactConfig impact;
+  AnomalyConfig anomaly;
 };
 
 }  // namespace ear

@@ -10,6 +10,8 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -67,11 +69,30 @@ struct TerrainEstimate {
   double sigma_across = 0.0;  ///< [rad]
 };
 
+/// The sensors that each tell how far the body went.
+enum class MotionSensor : std::uint8_t { imu, odometer, camera };
+inline constexpr std::size_t kMotionSensors = 3;
+
+/// How far the sensors agree about the way since the frame before: the paper's (13)-(15); docs/anomaly.md. Arrays are
+/// in the order of MotionSensor; coefficients, score and threshold have the unit of AnomalyConfig::score.
+struct Consistency {
+  std::array<bool, kMotionSensors> available{};      ///< who told of a displacement
+  std::array<double, kMotionSensors> coefficient{};  ///< how far each is from the others, (14)
+  std::array<double, kMotionSensors> weight{};       ///< (15): 1 is trusted, 0 told nothing
+  double variance = 0.0;                             ///< of the displacements, (13) [m^2]
+  double score = 0.0;                                ///< above the threshold they disagree
+  double threshold = 0.0;
+  std::optional<MotionSensor> anomalous;  ///< who is at fault; of two that disagree, nobody knows
+
+  [[nodiscard]] bool disagree() const { return score > threshold; }
+};
+
 struct Estimate {
   NavState state;
   Eigen::Matrix<double, estimate_error::size, estimate_error::size> covariance;  ///< see estimate_error
   TerrainEstimate terrain;
   FrameStatistics frame;
+  Consistency consistency;
 };
 
 /// What was refused or bridged since the start; nothing is lost silently.

@@ -35,6 +35,16 @@ constexpr auto names_of(OdometerUpdate) {
       {{"velocity", OdometerUpdate::velocity}, {"displacement", OdometerUpdate::displacement}}};
 }
 
+constexpr auto names_of(AnomalyScore) {
+  return std::array<std::pair<const char*, AnomalyScore>, 2>{
+      {{"distance", AnomalyScore::distance}, {"mahalanobis", AnomalyScore::mahalanobis}}};
+}
+
+constexpr auto names_of(AnomalyWeight) {
+  return std::array<std::pair<const char*, AnomalyWeight>, 2>{
+      {{"symmetric", AnomalyWeight::symmetric}, {"printed", AnomalyWeight::printed}}};
+}
+
 /// C is T, or T and const.
 template <typename C, typename T>
 using EnableFor = std::enable_if_t<std::is_same_v<std::remove_const_t<C>, T>>;
@@ -120,6 +130,16 @@ EnableFor<C, ImpactConfig> visit(C& c, F&& f) {
 }
 
 template <typename C, typename F>
+EnableFor<C, AnomalyConfig> visit(C& c, F&& f) {
+  f("enabled", c.enabled);
+  f("score", c.score);
+  f("weight", c.weight);
+  f("distance", c.distance);
+  f("false_alarm", c.false_alarm);
+  f("min_weight", c.min_weight);
+}
+
+template <typename C, typename F>
 EnableFor<C, FilterConfig> visit(C& c, F&& f) {
   f("window", c.window);
   f("max_track_updates", c.max_track_updates);
@@ -134,6 +154,7 @@ EnableFor<C, FilterConfig> visit(C& c, F&& f) {
   f("odometer", c.odometer);
   f("contact", c.contact);
   f("impact", c.impact);
+  f("anomaly", c.anomaly);
 }
 
 template <typename C, typename F>
