@@ -43,8 +43,7 @@ StereoPoint stereo_point(const CameraState& camera, const FeatureObservation& fe
   J_c.leftCols<2>() = R_C1C0.topLeftCorner<2, 2>() - right * R_C1C0.bottomLeftCorner<1, 2>();
   J_c.rightCols<2>() = -a.z() * Eigen::Matrix2d::Identity();
   J_d.rightCols<2>() = t.z() * Eigen::Matrix2d::Identity();
-  const Eigen::RowVector4d J_z =
-      (d.transpose() * J_c + c.transpose() * J_d - 2.0 * z * c.transpose() * J_c) / c2;
+  const Eigen::RowVector4d J_z = (d.transpose() * J_c + c.transpose() * J_d - 2.0 * z * c.transpose() * J_c) / c2;
   if (!(sigma * J_z.norm() < kMaxDepthShare * z)) return point;
   Eigen::Matrix<double, 3, 4> J_point = ray * J_z;
   J_point.topLeftCorner<2, 2>().diagonal().array() += z;

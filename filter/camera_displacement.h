@@ -16,8 +16,8 @@ namespace ear {
 /// A feature's position as one frame shows it.
 struct StereoPoint {
   std::uint64_t id = 0;
-  bool usable = false;  ///< in front of both cameras, on rays that meet, at a known distance
-  Eigen::Vector3d p_BF = Eigen::Vector3d::Zero();        ///< [m]
+  bool usable = false;                             ///< in front of both cameras, on rays that meet, at a known distance
+  Eigen::Vector3d p_BF = Eigen::Vector3d::Zero();  ///< [m]
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< by the noise of both observations [m^2]
 };
 

@@ -102,8 +102,8 @@ Consistency ConsistencyCheck::operator()(const Displacements& displacements) con
   }
   if (count < static_cast<int>(kMotionSensors) || !result.disagree()) return result;
 
-  const auto worst = static_cast<std::size_t>(
-      std::max_element(result.coefficient.begin(), result.coefficient.end()) - result.coefficient.begin());
+  const auto worst = static_cast<std::size_t>(std::max_element(result.coefficient.begin(), result.coefficient.end()) -
+                                              result.coefficient.begin());
   result.anomalous = static_cast<MotionSensor>(worst);
   const double weight = weight_of(worst, between_others, config_.weight);
   result.weight[worst] = std::isfinite(weight) ? std::clamp(weight, config_.min_weight, 1.0) : config_.min_weight;

@@ -1,5 +1,5 @@
-// How far the body goes until the next frame, once by the IMU and once by the wheels: what the consistency check compares
-// with the camera. docs/anomaly.md.
+// How far the body goes until the next frame, once by the IMU and once by the wheels: what the consistency check
+// compares with the camera. docs/anomaly.md.
 #pragma once
 
 #include <Eigen/Core>

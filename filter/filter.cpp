@@ -342,7 +342,8 @@ void Filter::compare_sensors(const FeatureFrame& frame, TimeNs t_ns) {
   displacements[index_of(MotionSensor::imu)] = imu_displacement(motion, covariance_);
   displacements[index_of(MotionSensor::odometer)] = displacement_by_wheels(t_ns);
   if (state_.imu.t_ns != compared_ns_) camera_displacement_.clear();  // the frame before was not where the state is
-  const double bias = motion.duration * motion.duration * covariance_.matrix().diagonal().segment<3>(err::b_g).maxCoeff();
+  const double bias =
+      motion.duration * motion.duration * covariance_.matrix().diagonal().segment<3>(err::b_g).maxCoeff();
   displacements[index_of(MotionSensor::camera)] =
       camera_displacement_.add(frame, state_.camera, motion.R_BiBj, motion.rotation_variance + bias);
   compared_ns_ = t_ns;

@@ -41,7 +41,9 @@ std::string states_heading() {
   }
   return heading +
          ",tracks,stereo,features_used,features_rejected,clones,wheel_rows_used,wheel_rows_rejected,beams_used,"
-         "beams_rejected,standing,on_ground,slope_along,slope_across,sigma_slope_along,sigma_slope_across\n";
+         "beams_rejected,standing,on_ground,slope_along,slope_across,sigma_slope_along,sigma_slope_across,"
+         "weight_imu,weight_odometer,weight_camera,inconsistency_imu,inconsistency_odometer,inconsistency_camera,"
+         "displacement_variance,disagreement,anomalous\n";
 }
 
 void append(std::string& line, double value) {
@@ -60,6 +62,13 @@ std::string seconds_text(TimeNs t_ns) {
   std::string fraction = std::to_string(size % 1'000'000'000);
   fraction.insert(0, 9 - fraction.size(), '0');
   return (t_ns < 0 ? "-" : "") + std::to_string(size / 1'000'000'000) + "." + fraction;
+}
+
+// Column `anomalous`: nobody, a sensor in the order of MotionSensor, or one of two.
+int anomalous_code(const Consistency& consistency) {
+  constexpr int kNobody = 0, kFirstSensor = 1, kOneOfTwo = 4;
+  if (!consistency.disagree()) return kNobody;
+  return consistency.anomalous ? kFirstSensor + static_cast<int>(*consistency.anomalous) : kOneOfTwo;
 }
 
 nlohmann::ordered_json to_json(const std::vector<Warning>& warnings) {
@@ -123,6 +132,12 @@ void StatesWriter::write(const Estimate& estimate) {
       line += ",nan";
     }
   }
+  const Consistency& consistency = estimate.consistency;
+  for (const double weight : consistency.weight) append(line, weight);
+  for (const double coefficient : consistency.coefficient) append(line, coefficient);
+  append(line, consistency.variance);
+  append(line, consistency.threshold > 0.0 ? consistency.score / consistency.threshold : 0.0);
+  line += "," + std::to_string(anomalous_code(consistency));
   out_.write(line + "\n");
 }
 

@@ -25,6 +25,7 @@ Estimate numbered_estimate() {
   }
   e.frame = {60, 61, 62, 63, 64, 65, 66, 67, 68, true, true};
   e.terrain = {true, 0.6, 0.7, 0.8, 0.9};
+  e.consistency = {{true, true, true}, {0.01, 0.02, 0.03}, {1.0, 0.25, 1.0}, 4e-4, 0.02, 0.01, MotionSensor::odometer};
   return e;
 }
 
@@ -69,7 +70,7 @@ TEST_CASE("states: every value stands below its name") {
   }
   CHECK_FALSE(std::getline(fields, field, ','));
 
-  CHECK(row.size() == 1 + 3 + 4 + 9 + 21 + 9 + 11 + 4);
+  CHECK(row.size() == 1 + 3 + 4 + 9 + 21 + 9 + 11 + 4 + 9);
   CHECK(row["t_ns"] == "1403715273262142976");
   CHECK(row["p_z"] == "3");
   CHECK(row["q_w"] == "0.5");
@@ -93,6 +94,11 @@ TEST_CASE("states: every value stands below its name") {
   CHECK(row["on_ground"] == "1");
   CHECK(row["slope_across"] == "0.7");
   CHECK(row["sigma_slope_along"] == "0.8");
+  CHECK(row["weight_odometer"] == "0.25");
+  CHECK(row["inconsistency_camera"] == "0.03");
+  CHECK(row["displacement_variance"] == "0.0004");
+  CHECK(row["disagreement"] == "2");
+  CHECK(row["anomalous"] == "2");
 }
 
 TEST_CASE("summary: valid JSON with all that was said") {
