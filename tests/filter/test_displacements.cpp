@@ -1,0 +1,206 @@
+#include "filter/displacements.h"
+
+#include <doctest/doctest.h>
+
+#include <Eigen/Cholesky>
+#include <cmath>
+#include <random>
+
+#include "filter/displacement_update.h"
+#include "filter/propagation.h"
+#include "tests/support/check_jacobian.h"
+#include "tests/support/random_state.h"
+
+using namespace ear;
+using namespace ear::test;
+
+namespace {
+
+constexpr TimeNs kStart = 1'000'000'000;
+constexpr TimeNs kEnd = kStart + 200'000'000;
+
+ImpactGuard guard() { return {ImpactConfig{}, ImuCalibration{}}; }
+
+/// A vehicle that turns and shakes, 200 samples a second.
+ImuBuffer random_samples(std::mt19937_64& rng, const State& x, double accel_noise = 0.0) {
+  std::mt19937_64 motion{5};
+  ImuBuffer buffer(256);
+  for (TimeNs t_ns = kStart - 50'000'000; t_ns <= kEnd + 50'000'000; t_ns += 5'000'000) {
+    ImuSample sample;
+    sample.t_ns = t_ns;
+    sample.gyro_B = Eigen::Vector3d(0.2, -0.3, 1.0) + random_vector(motion, 0.1) + x.imu.b_g;
+    sample.accel_B = Eigen::Vector3d(1.0, 0.5, 9.8) + random_vector(motion, 0.5) + random_vector(rng, accel_noise);
+    buffer.push(sample);
+  }
+  return buffer;
+}
+
+State random_start(std::mt19937_64& rng) {
+  State x = random_state(rng, 0);
+  x.imu.t_ns = kStart;
+  x.imu.R_WB = exp_so3(random_vector(rng, 0.1));
+  return x;
+}
+
+Ring<WheelTurn> random_turns(std::mt19937_64& rng) {
+  Ring<WheelTurn> turns(64);
+  for (TimeNs t_ns = kStart - 3'000'000; t_ns < kEnd - 4'000'000; t_ns += 10'000'000) {
+    const Eigen::Vector3d rate = Eigen::Vector3d::Constant(12.0) + random_vector(rng, 1.0);
+    turns.push({t_ns, t_ns + 10'000'000, 0.01 * rate.head<2>()});
+  }
+  return turns;
+}
+
+WheelSetting setting_of(const State& x) {
+  WheelSetting setting;
+  setting.wheels = wheel_model(x.odometer);
+  setting.on_plane = true;
+  return setting;
+}
+
+/// Draws errors of standard deviation `sigma` into a state; mean of what f says of the result, over its covariance.
+template <typename Function>
+double mean_chi_squared(std::mt19937_64& rng, const State& x, const Eigen::VectorXd& sigma,
+                        const Displacement& expected, const Function& f) {
+  constexpr int kRuns = 2000;
+  const Eigen::LLT<Eigen::Matrix3d> llt(expected.covariance);
+  std::normal_distribution<double> normal;
+  double sum = 0.0;
+  for (int run = 0; run < kRuns; ++run) {
+    Eigen::VectorXd d = Eigen::VectorXd::Zero(x.error_size());
+    for (Eigen::Index i = 0; i < sigma.size(); ++i) d(i) = sigma(i) * normal(rng);
+    const Eigen::Vector3d e = f(boxplus(x, d)).p_BiBj - expected.p_BiBj;
+    sum += e.dot(llt.solve(e)) / kRuns;
+  }
+  return sum;
+}
+
+}  // namespace
+
+TEST_CASE("displacements: the IMU's is where propagation takes the body, and H its derivative") {
+  std::mt19937_64 rng{71};
+  for (int trial = 0; trial < 10; ++trial) {
+    CAPTURE(trial);
+    const State x = random_start(rng);
+    const ImuBuffer samples = random_samples(rng, x);
+    ImuState end = x.imu;
+    samples.for_each_piece(kStart, kEnd, [&](const Eigen::Vector3d& gyro_B, const Eigen::Vector3d& accel_B, double dt) {
+      end = integrate(end, gyro_B, accel_B, dt);
+    });
+    const ImuMotion motion = imu_motion(x.imu, samples, kEnd, ImuCalibration{}, guard());
+    CHECK((motion.p_BiBj - x.imu.R_WB.transpose() * (end.p_WB - x.imu.p_WB)).norm() < 1e-9);
+    CHECK((motion.R_BiBj - x.imu.R_WB.transpose() * end.R_WB).norm() < 1e-9);
+    CHECK(motion.duration == doctest::Approx(0.2));
+    check_jacobian(
+        [&](const Eigen::VectorXd& d) -> Eigen::VectorXd {
+          Eigen::VectorXd error = Eigen::VectorXd::Zero(x.error_size());
+          error.head<err::imu_size>() = d;
+          return imu_motion(boxplus(x, error).imu, samples, kEnd, ImuCalibration{}, guard()).p_BiBj;
+        },
+        motion.H);
+  }
+}
+
+TEST_CASE("displacements: the IMU's noise spreads it as its covariance says") {
+  std::mt19937_64 rng{72};
+  const State x = random_start(rng);
+  ImuCalibration noise;
+  const double sample_noise = noise.accel_noise * std::sqrt(200.0);
+  const ImuMotion clean = imu_motion(x.imu, random_samples(rng, x), kEnd, noise, guard());
+  double squares = 0.0;
+  constexpr int kRuns = 1000;
+  for (int run = 0; run < kRuns; ++run) {
+    const ImuBuffer samples = random_samples(rng, x, sample_noise);
+    squares += (imu_motion(x.imu, samples, kEnd, noise, guard()).p_BiBj - clean.p_BiBj).squaredNorm() / kRuns;
+  }
+  CHECK(squares == doctest::Approx(3.0 * clean.position_variance).epsilon(0.1));
+}
+
+TEST_CASE("displacements: a strike among the samples makes the IMU's uncertain") {
+  std::mt19937_64 rng{73};
+  const State x = random_start(rng);
+  ImuBuffer samples = random_samples(rng, x);
+  const double before = imu_motion(x.imu, samples, kEnd, ImuCalibration{}, guard()).position_variance;
+  ImuBuffer struck(256);
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    ImuSample sample = samples[i];
+    if (sample.t_ns > kStart + 50'000'000 && sample.t_ns < kStart + 70'000'000) sample.accel_B.z() += 60.0;
+    struck.push(sample);
+  }
+  CHECK(imu_motion(x.imu, struck, kEnd, ImuCalibration{}, guard()).position_variance > 10.0 * before);
+}
+
+TEST_CASE("displacements: the covariance of the IMU's follows from the state's (2000 draws)") {
+  std::mt19937_64 rng{74};
+  const State x = random_start(rng);
+  const ImuBuffer samples = random_samples(rng, x);
+  ImuCalibration none;
+  none.accel_noise = 1e-9;
+  Eigen::VectorXd sigma = Eigen::VectorXd::Zero(err::clones);
+  sigma.segment<3>(err::theta).setConstant(0.01);
+  sigma.segment<3>(err::nu).setConstant(0.005);
+  sigma.segment<3>(err::rho).setConstant(1.0);
+  sigma.segment<3>(err::b_g).setConstant(0.01);
+  sigma.segment<3>(err::b_a).setConstant(0.1);
+  Covariance P(err::clones);
+  P.reset(sigma);
+  const auto displacement = [&](const State& state) {
+    return imu_displacement(imu_motion(state.imu, samples, kEnd, none, guard()), P);
+  };
+  CHECK(mean_chi_squared(rng, x, sigma, displacement(x), displacement) == doctest::Approx(3.0).epsilon(0.1));
+}
+
+TEST_CASE("displacements: the covariance of the wheels' follows from the state's (2000 draws)") {
+  std::mt19937_64 rng{75};
+  const State x = random_start(rng);
+  const ImuBuffer samples = random_samples(rng, x);
+  const Ring<WheelTurn> turns = random_turns(rng);
+  Eigen::VectorXd sigma = Eigen::VectorXd::Zero(err::clones);
+  sigma.segment<3>(err::theta).setConstant(0.05);
+  sigma.segment<3>(err::b_g).setConstant(0.02);
+  sigma.segment<2>(err::normal).setConstant(0.01);
+  sigma.segment<2>(err::wheel_radius).setConstant(0.01);
+  sigma(err::wheel_separation) = 0.01;
+  sigma.segment<3>(err::odometer).setConstant(0.01);
+  Covariance P(err::clones);
+  P.reset(sigma);
+  for (const bool on_plane : {true, false}) {
+    CAPTURE(on_plane);
+    const auto displacement = [&](const State& state) {
+      WheelSetting setting = setting_of(state);
+      setting.on_plane = on_plane;
+      return wheel_displacement(state, P, TurnsBetween({}, turns), samples, kEnd, setting);
+    };
+    REQUIRE(displacement(x).available);
+    CHECK(mean_chi_squared(rng, x, sigma, displacement(x), displacement) == doctest::Approx(3.0).epsilon(0.1));
+  }
+}
+
+TEST_CASE("displacements: the wheels' is that of the body, and needs readings all the way") {
+  std::mt19937_64 rng{76};
+  State x = random_start(rng);
+  x.imu.R_WB.setIdentity();
+  x.imu.b_g.setZero();
+  x.ground.n_W = Eigen::Vector3d::UnitZ();
+  x.odometer.wheel_radius.setConstant(0.08);
+  x.odometer.T_BO = {Eigen::Matrix3d::Identity(), {0.1, 0.0, -0.05}};
+  Covariance P(err::clones);
+  P.reset(Eigen::VectorXd::Constant(err::clones, 1e-3));
+  // On the spot, turning left at 1 rad/s: the axle's middle stands, the body goes round it.
+  ImuBuffer samples(64);
+  for (TimeNs t_ns = kStart; t_ns <= kEnd; t_ns += 5'000'000) samples.push({t_ns, {0, 0, 1.0}, {0, 0, 9.81}});
+  Ring<WheelTurn> turns(64);
+  for (TimeNs t_ns = kStart + 6'000'000; t_ns < kEnd; t_ns += 10'000'000) {
+    turns.push({t_ns, t_ns + 10'000'000, {-0.02, 0.02}});
+  }
+  const std::optional<WheelTurn> passed = WheelTurn{kStart - 4'000'000, kStart + 6'000'000, {-0.02, 0.02}};
+  const auto displacement = [&](TimeNs until_ns) {
+    return wheel_displacement(x, P, TurnsBetween(passed, turns), samples, until_ns, setting_of(x));
+  };
+  const Eigen::Vector3d p_BO = x.odometer.T_BO.p;
+  const Displacement turned = displacement(kEnd);
+  REQUIRE(turned.available);
+  CHECK((turned.p_BiBj - (p_BO - exp_so3({0, 0, 0.2}) * p_BO)).norm() < 1e-6);
+  CHECK_FALSE(displacement(kEnd + 80'000'000).available);  // no readings at the end
+  CHECK_FALSE(displacement(kStart).available);
+}
