@@ -31,7 +31,7 @@ class CameraDisplacement {
 
   /// The displacement from the frame of the call before to this one. `R_BiBj`: the rotation meanwhile, and
   /// `rotation_variance` that of each of its axes [rad^2]. Not available with too few points that agree.
-  [[nodiscard]] Displacement add(const FeatureFrame& frame, const CameraState& camera, const Eigen::Matrix3d& R_BiBj,
+  Displacement add(const FeatureFrame& frame, const CameraState& camera, const Eigen::Matrix3d& R_BiBj,
                                  double rotation_variance);
 
   /// As if no frame had come.
