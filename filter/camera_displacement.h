@@ -32,7 +32,7 @@ class CameraDisplacement {
   /// The displacement from the frame of the call before to this one. `R_BiBj`: the rotation meanwhile, and
   /// `rotation_variance` that of each of its axes [rad^2]. Not available with too few points that agree.
   Displacement add(const FeatureFrame& frame, const CameraState& camera, const Eigen::Matrix3d& R_BiBj,
-                                 double rotation_variance);
+                   double rotation_variance);
 
   /// As if no frame had come.
   void clear() { before_.clear(); }
