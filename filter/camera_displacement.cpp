@@ -117,9 +117,9 @@ Displacement CameraDisplacement::fit(double rotation_variance) const {
     if (llt.info() != Eigen::Success) return result;
     p = llt.solve(weighted);
   }
-  if (agreeing < kMinPoints || static_cast<double>(agreeing) < kMinShare * static_cast<double>(pairs_.size())) {
-    return result;
-  }
+  const double least = std::max(static_cast<double>(kMinPoints), kMinShare * static_cast<double>(pairs_.size()));
+  result.contradictory = static_cast<double>(agreeing) < least;
+  if (result.contradictory) return result;
   const Eigen::Matrix3d inverse = information.ldlt().solve(Eigen::Matrix3d::Identity());
   const Eigen::Matrix3d J = inverse * J_rotation;
   result.p_BiBj = p;

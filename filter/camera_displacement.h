@@ -30,7 +30,8 @@ class CameraDisplacement {
   CameraDisplacement(double sigma, std::size_t max_features);
 
   /// The displacement from the frame of the call before to this one. `R_BiBj`: the rotation meanwhile, and
-  /// `rotation_variance` that of each of its axes [rad^2]. Not available with too few points that agree.
+  /// `rotation_variance` that of each of its axes [rad^2]. Not available with too few points, contradictory where too
+  /// few agree.
   Displacement add(const FeatureFrame& frame, const CameraState& camera, const Eigen::Matrix3d& R_BiBj,
                    double rotation_variance);
 

@@ -80,6 +80,7 @@ Consistency ConsistencyCheck::operator()(const Displacements& displacements) con
     result.available[i] = displacements[i].available;
     result.weight[i] = result.available[i] ? 1.0 : 0.0;
     count += result.available[i] ? 1 : 0;
+    if (displacements[i].contradictory) result.anomalous = static_cast<MotionSensor>(i);
   }
   if (count < 2) return result;
 

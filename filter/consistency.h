@@ -14,6 +14,7 @@ namespace ear {
 /// How far the body went from frame i to frame j, as one sensor sees it.
 struct Displacement {
   bool available = false;
+  bool contradictory = false;  ///< not available, because what the sensor measured contradicts itself
   Eigen::Vector3d p_BiBj = Eigen::Vector3d::Zero();      ///< [m]
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< of p_BiBj [m^2], positive definite
 };
@@ -28,7 +29,7 @@ class ConsistencyCheck {
   explicit ConsistencyCheck(const AnomalyConfig& config);
 
   /// Weights are 1 except for the sensor at fault, and 0 where there is no displacement. It takes three to tell who is
-  /// at fault; two that disagree keep their weights.
+  /// at fault; two that disagree keep their weights. A sensor that contradicts itself is at fault in any case.
   [[nodiscard]] Consistency operator()(const Displacements& displacements) const;
 
  private:

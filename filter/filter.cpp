@@ -373,7 +373,8 @@ WheelNoise Filter::wheel_noise() const {
 
 /// Factor on the inverse standard deviation of what the sensor says about the interval at hand.
 double Filter::trust(MotionSensor sensor) const {
-  return config_.anomaly.enabled && consistency_.anomalous == sensor ? consistency_.weight[index_of(sensor)] : 1.0;
+  if (!config_.anomaly.enabled || consistency_.anomalous != sensor) return 1.0;
+  return std::max(consistency_.weight[index_of(sensor)], config_.anomaly.min_weight);
 }
 
 /// Standing: the mean specific force is gravity, the mean rate is the gyroscope's bias.

@@ -110,9 +110,9 @@ struct AnomalyConfig {
   bool enabled = true;  ///< weigh down the one at fault
   AnomalyScore score = AnomalyScore::mahalanobis;
   AnomalyWeight weight = AnomalyWeight::symmetric;
-  double distance = 0.01;     ///< [m] with `distance`: root of the variance (13) that is too much
+  double distance = 0.005;    ///< [m] with `distance`: root of the variance (13) that is too much
   double false_alarm = 1e-4;  ///< with `mahalanobis`: probability of an alarm about sensors that are right
-  double min_weight = 0.05;   ///< of the sensor at fault
+  double min_weight = 0.02;   ///< of the sensor at fault
 };
 
 struct FilterConfig {

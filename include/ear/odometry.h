@@ -82,7 +82,7 @@ struct Consistency {
   double variance = 0.0;                             ///< of the displacements, (13) [m^2]
   double score = 0.0;                                ///< above the threshold they disagree
   double threshold = 0.0;
-  std::optional<MotionSensor> anomalous;  ///< who is at fault; of two that disagree, nobody knows
+  std::optional<MotionSensor> anomalous;  ///< who is at fault; of two that disagree, nobody knows who
 
   [[nodiscard]] bool disagree() const { return score > threshold; }
 };

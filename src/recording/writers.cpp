@@ -67,8 +67,8 @@ std::string seconds_text(TimeNs t_ns) {
 // Column `anomalous`: nobody, a sensor in the order of MotionSensor, or one of two.
 int anomalous_code(const Consistency& consistency) {
   constexpr int kNobody = 0, kFirstSensor = 1, kOneOfTwo = 4;
-  if (!consistency.disagree()) return kNobody;
-  return consistency.anomalous ? kFirstSensor + static_cast<int>(*consistency.anomalous) : kOneOfTwo;
+  if (consistency.anomalous) return kFirstSensor + static_cast<int>(*consistency.anomalous);
+  return consistency.disagree() ? kOneOfTwo : kNobody;
 }
 
 nlohmann::ordered_json to_json(const std::vector<Warning>& warnings) {

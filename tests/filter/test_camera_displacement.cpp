@@ -139,26 +139,28 @@ TEST_CASE("camera_displacement: nothing without points that both frames show, or
   const Scene scene(rng, camera, 40);
   const FeatureFrame frame = scene.seen_from(Pose{}, rng, kSigma);
   CameraDisplacement displacement(kSigma, 512);
-  const auto available = [&](FeatureFrame next) {
+  const auto move = [&](const FeatureFrame& next) {
     displacement.clear();
     displacement.add(frame, camera, Eigen::Matrix3d::Identity(), 0.0);
-    return displacement.add(next, camera, Eigen::Matrix3d::Identity(), 0.0).available;
+    return displacement.add(next, camera, Eigen::Matrix3d::Identity(), 0.0);
   };
-  CHECK(available(frame));
+  CHECK(move(frame).available);
   FeatureFrame changed = frame;
   changed.features.resize(5);
-  CHECK_FALSE(available(changed));
+  CHECK_FALSE(move(changed).available);
+  CHECK_FALSE(move(changed).contradictory);
   changed = frame;
   for (FeatureObservation& feature : changed.features) feature.has_right = false;
-  CHECK_FALSE(available(changed));
+  CHECK_FALSE(move(changed).available);
   changed = frame;
   for (FeatureObservation& feature : changed.features) feature.id += 1000;
-  CHECK_FALSE(available(changed));
+  CHECK_FALSE(move(changed).available);
   changed = frame;
   for (FeatureObservation& feature : changed.features) {
     const Eigen::Vector3d jump = random_vector(rng, 0.1);
     feature.left += jump.head<2>();
     feature.right += jump.head<2>();
   }
-  CHECK_FALSE(available(changed));
+  CHECK_FALSE(move(changed).available);
+  CHECK(move(changed).contradictory);
 }

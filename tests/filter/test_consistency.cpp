@@ -17,7 +17,7 @@ constexpr std::size_t O = index_of(MotionSensor::odometer);
 constexpr std::size_t C = index_of(MotionSensor::camera);
 
 Displacement at(double x, double y, double z, double sigma = 1e-3) {
-  return {true, {x, y, z}, sigma * sigma * Eigen::Matrix3d::Identity()};
+  return {true, false, {x, y, z}, sigma * sigma * Eigen::Matrix3d::Identity()};
 }
 
 AnomalyConfig with(AnomalyScore score, AnomalyWeight weight = AnomalyWeight::symmetric) {
@@ -104,6 +104,15 @@ TEST_CASE("consistency: of two that disagree, nobody knows who is wrong; who say
     CHECK_FALSE(alone.disagree());
     CHECK(alone.weight == std::array<double, 3>{1.0, 0.0, 0.0});
   }
+}
+
+TEST_CASE("consistency: a sensor that contradicts itself is at fault, whatever the others say") {
+  Displacement torn;
+  torn.contradictory = true;
+  const Consistency result = ConsistencyCheck(with(AnomalyScore::distance))({at(0.1, 0, 0), at(0.1, 0, 0), torn});
+  CHECK(result.anomalous == MotionSensor::camera);
+  CHECK_FALSE(result.disagree());
+  CHECK(result.weight == std::array<double, 3>{1.0, 1.0, 0.0});
 }
 
 TEST_CASE("consistency: two that are equal leave the third its least weight") {
