@@ -13,7 +13,8 @@ constexpr double kMaxDepthShare = 0.25;  // standard deviation of a point's dist
 constexpr double kMaxMiss = 4.0;         // of the rays, in standard deviations: not the same point
 constexpr double kHuber = 1.5;           // standard deviations from which a point weighs less
 constexpr double kOutlier = 4.0;         // from which it counts no more, once the rest has agreed
-constexpr int kIterations = 5;           // of which the last two leave outliers out
+constexpr int kRobust = 3;               // iterations with Huber's weights
+constexpr int kIterations = 5;           // and those that leave outliers out
 constexpr std::size_t kMinPoints = 6;
 constexpr double kMinShare = 0.3;  // of the points, that must agree
 
@@ -95,31 +96,30 @@ void CameraDisplacement::match(const Eigen::Matrix3d& R_BiBj) {
 Displacement CameraDisplacement::fit(double rotation_variance) const {
   Displacement result;
   if (pairs_.size() < kMinPoints) return result;
+  const double least = std::max(static_cast<double>(kMinPoints), kMinShare * static_cast<double>(pairs_.size()));
   Eigen::Vector3d p = Eigen::Vector3d::Zero();
   Eigen::Matrix3d information, J_rotation;
-  std::size_t agreeing = 0;
   for (int iteration = 0; iteration < kIterations; ++iteration) {
     information.setZero();
     J_rotation.setZero();
     Eigen::Vector3d weighted = Eigen::Vector3d::Zero();
-    agreeing = 0;
+    int agreeing = 0;
     for (const Pair& pair : pairs_) {
       const Eigen::Vector3d residual = pair.p_BiBj - p;
       const double distance = iteration == 0 ? 0.0 : std::sqrt(residual.dot(pair.information * residual));
       if (distance < kOutlier) ++agreeing;
-      if (iteration >= kIterations - 2 && distance >= kOutlier) continue;
+      if (iteration >= kRobust && distance >= kOutlier) continue;
       const Eigen::Matrix3d W = (distance > kHuber ? kHuber / distance : 1.0) * pair.information;
       information += W;
       weighted += W * pair.p_BiBj;
       J_rotation += W * skew(pair.lever_Bi);
     }
+    result.contradictory = iteration >= kRobust && agreeing < least;
+    if (result.contradictory) return result;
     const Eigen::LLT<Eigen::Matrix3d> llt(information);
     if (llt.info() != Eigen::Success) return result;
     p = llt.solve(weighted);
   }
-  const double least = std::max(static_cast<double>(kMinPoints), kMinShare * static_cast<double>(pairs_.size()));
-  result.contradictory = static_cast<double>(agreeing) < least;
-  if (result.contradictory) return result;
   const Eigen::Matrix3d inverse = information.ldlt().solve(Eigen::Matrix3d::Identity());
   const Eigen::Matrix3d J = inverse * J_rotation;
   result.p_BiBj = p;
