@@ -107,7 +107,7 @@ enum class AnomalyWeight : std::uint8_t {
 
 /// Sensors compared over every interval between frames: the paper's III-D; docs/anomaly.md.
 struct AnomalyConfig {
-  bool enabled = true;  ///< weigh down the one at fault
+  bool enabled = false;  ///< weigh down the one at fault; it is named in any case
   AnomalyScore score = AnomalyScore::mahalanobis;
   AnomalyWeight weight = AnomalyWeight::symmetric;
   double distance = 0.005;    ///< [m] with `distance`: root of the variance (13) that is too much
