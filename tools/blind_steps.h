@@ -1,6 +1,7 @@
 // When to ask the estimator for a step because no image comes.
 #pragma once
 
+#include <algorithm>
 #include <limits>
 
 #include "ear/types.h"
@@ -13,7 +14,12 @@ class BlindSteps {
  public:
   BlindSteps(bool has_camera, bool has_wheels) : has_wheels_(has_wheels), missing_from_ns_(has_camera ? kNever : 0) {}
 
-  void saw_frame(TimeNs t_ns) { missing_from_ns_ = t_ns + kPatience; }
+  void saw_frame(TimeNs t_ns) {
+    const TimeNs interval = t_ns - last_frame_ns_;  // of a slow camera no frame is missing yet
+    if (interval > 0 && interval < kSlowest) patience_ = std::max(kPatience, interval + interval / 2);
+    last_frame_ns_ = t_ns;
+    missing_from_ns_ = t_ns + patience_;
+  }
 
   /// Whether a step is due now; then the next one is due kStep later.
   [[nodiscard]] bool due(TimeNs t_ns) {
@@ -25,9 +31,12 @@ class BlindSteps {
  private:
   static constexpr TimeNs kNever = std::numeric_limits<TimeNs>::max();
   static constexpr TimeNs kStep = 50'000'000;       // between estimates without images
-  static constexpr TimeNs kPatience = 150'000'000;  // so long after the last image the next one is missing
+  static constexpr TimeNs kPatience = 150'000'000;  // so long after the last image the next one is missing, at least
+  static constexpr TimeNs kSlowest = 400'000'000;   // longer intervals between images are outages
 
   bool has_wheels_;
+  TimeNs last_frame_ns_ = 0;
+  TimeNs patience_ = kPatience;
   TimeNs missing_from_ns_;  // before the first image of a camera nothing is missing
   TimeNs next_step_ns_ = 0;
 };
