@@ -30,11 +30,14 @@ constexpr double kGyroSpike = 2.0;             // [rad/s] the same
 constexpr double kSpikeRatio = 4.0;            // and so many times the difference of these
 constexpr double kTooLate = 0.1;               // [s] behind the state: a reading that comes so late is not used
 constexpr double kWheelAge = 0.1;              // [s] older readings do not tell whether the wheels rest
-constexpr double kHeldSample = 0.02;           // [s] so far the newest IMU sample may stand in for one that is missing
+constexpr double kHeldSample = 0.04;           // [s] so far the newest IMU sample may stand in for one that is missing
 constexpr double kGapNoiseFactor = 10.0;       // on the noise densities while a gap in the IMU data is bridged
 constexpr double kStartGravityNoise = 0.02;    // [m/s^2] what idling rotors leave in the mean specific force
 constexpr double kKnownSigma = 1e-6;           // [m, rad] of position and yaw at the start: by definition zero
 constexpr double kUnknownTilt = 0.3;           // [rad] before gravity was measured
+constexpr double kUnseenSpeed = 1.0;           // [m/s] that the vehicle may have gained since it was lost
+constexpr double kOldImage = 0.5;              // [s] after which frames have little in common
+constexpr double kLifting = 0.3;               // [s] after wheels that leave the ground, or meet it, as it seems
 constexpr double kCommonShare = 0.5;           // of its features, that the elder of a copy must have seen
 constexpr std::size_t kMaxCompared = 512;      // features of a frame whose motion is compared with other sensors
 constexpr std::size_t kMinObservations = 2;    // clones that must have seen a feature
@@ -136,6 +139,10 @@ Filter::Filter(const FilterConfig& config, const Calibration& calibration)
       standstill_(config.standstill, focal_px_),
       consistency_check_(config.anomaly),
       camera_displacement_(config.feature_sigma_px / focal_px_, kMaxCompared),
+      frame_check_(config.feature_sigma_px / focal_px_, gate_(2)),
+      monitor_(calibration, calibration.encoder && config.odometer.model != OdometerModel::none,
+               config.odometer.model == OdometerModel::terrain),
+      moving_start_({config.prior.gyro_bias, config.prior.accel_bias, config.feature_sigma_px / focal_px_}),
       information_(config.window + 1, config.max_track_updates) {
   state_.camera = camera_state(calibration);
   state_.odometer = odometer_state(calibration);
@@ -161,8 +168,10 @@ void Filter::add_imu(const ImuSample& sample) {
   const bool finite = sample.gyro_B.allFinite() && sample.accel_B.allFinite();
   if (!finite || (!imu_.empty() && sample.t_ns <= imu_.newest().t_ns)) {
     ++counts_.imu_rejected;
+    monitor_.add_imu(sample, true, config_.max_imu_gap);
     return;
   }
+  monitor_.add_imu(sample, false, config_.max_imu_gap);
   if (!imu_.empty() && seconds_between(imu_.newest().t_ns, sample.t_ns) > config_.max_imu_gap) ++counts_.imu_gaps;
   // Without frames for long, the state moves on before its samples are overwritten.
   if (status_ == Status::tracking && imu_.size() == kImuCapacity && state_.imu.t_ns < imu_[kImuCapacity / 2].t_ns) {
@@ -184,10 +193,10 @@ void Filter::mend_spike(const ImuSample& next) {
     const double off = (b - 0.5 * (a + c)).norm();
     return off > least && off > kSpikeRatio * (c - a).norm();
   };
-  if (!spike(before.gyro_B, suspect.gyro_B, next.gyro_B, kGyroSpike) &&
-      !spike(before.accel_B, suspect.accel_B, next.accel_B, kAccelSpike)) {
-    return;
-  }
+  const bool gyro = spike(before.gyro_B, suspect.gyro_B, next.gyro_B, kGyroSpike);
+  const bool accel = spike(before.accel_B, suspect.accel_B, next.accel_B, kAccelSpike);
+  if (!gyro && !accel) return;
+  monitor_.add_spike(gyro, accel, next.t_ns);
   imu_.correct_newest(0.5 * (before.gyro_B + next.gyro_B), 0.5 * (before.accel_B + next.accel_B));
   ++counts_.imu_spikes;
 }
@@ -214,6 +223,7 @@ void Filter::add_encoder(const EncoderSample& sample) {
     ++counts_.encoder_rejected;
     return;
   }
+  if (!imu_.empty()) monitor_.add_encoder(sample, imu_.newest().t_ns);
   note_contact(contact_.add_encoder(sample));
   const std::optional<WheelTurn> turn = encoder_->add(sample);
   if (!turn) return;
@@ -239,6 +249,7 @@ void Filter::add_laser(const LaserSample& sample) {
     return;
   }
   last_range_ns_ = sample.t_ns;
+  if (!imu_.empty()) monitor_.add_laser(sample, *calibration_.lasers, imu_.newest().t_ns);
   note_contact(contact_.add_laser(sample));
   if (status_ == Status::tracking) {
     if (ranges_.full()) advance_measuring(ranges_.front().t_ns);
@@ -256,6 +267,10 @@ std::optional<RelativeMotion> Filter::motion_to(TimeNs t_ns) const {
   if (!any_image_ || imu_.empty() || t_ns <= last_image_ns_) return std::nullopt;
   RelativeMotion motion;
   if (status_ != Status::tracking) {
+    if (const std::optional<Eigen::Vector3d> way = moving_start_.way_to(imu_time(t_ns))) {
+      motion.p_B0B1 = *way;
+      motion.translation_known = true;
+    }
     Eigen::Matrix3d R_B0B1 = Eigen::Matrix3d::Identity();
     imu_.for_each_piece(
         imu_time(last_image_ns_), imu_time(t_ns),
@@ -263,20 +278,46 @@ std::optional<RelativeMotion> Filter::motion_to(TimeNs t_ns) const {
     motion.R_B1B0 = R_B0B1.transpose();
     return motion;
   }
-  const std::optional<NavState> next = predict(imu_time(t_ns));
-  motion.R_B1B0 = next->q_WB.toRotationMatrix().transpose() * image_T_WB_.R;
-  motion.p_B0B1 = image_T_WB_.R.transpose() * (next->p_WB - image_T_WB_.p);
+  const NavState next = predict_here(imu_time(t_ns));
+  motion.R_B1B0 = next.q_WB.toRotationMatrix().transpose() * image_T_WB_.R;
+  motion.p_B0B1 = image_T_WB_.R.transpose() * (next.p_WB - image_T_WB_.p);
   motion.translation_known = true;
   return motion;
 }
 
 std::optional<Estimate> Filter::process(const FeatureFrame& frame) {
-  if (!covers(frame.t_ns) || !is_next(frame.t_ns)) return std::nullopt;
+  if (!is_next(frame.t_ns)) return std::nullopt;
+  if (!covers(frame.t_ns)) {
+    refuse_frame(frame.t_ns);
+    return std::nullopt;
+  }
+  const bool still = begin_frame(frame);
+  FrameAgreement agreement;
+  if (status_ == Status::tracking) {
+    agreement = check_frame(frame);
+    use_image(frame, still);
+  }
   any_image_ = true;
   last_image_ns_ = frame.t_ns;
-  const bool still = begin_frame(frame);
-  if (status_ != Status::tracking) return std::nullopt;
+  last_features_ = frame;
+  return finish_frame(true, agreement);
+}
 
+/// At the state's time, which is the frame's, before the frame changes it: does it show the motion since the last image
+/// that the other sensors predict?
+FrameAgreement Filter::check_frame(const FeatureFrame& frame) {
+  const double dt = seconds_between(last_image_ns_, frame.t_ns);
+  if (!any_image_ || dt > kOldImage || calibration_.cameras.size() < 2) return FrameAgreement{};
+  PredictedMotion motion;
+  motion.R_B0B1 = image_T_WB_.R.transpose() * state_.imu.R_WB;
+  motion.p_B0B1 = image_T_WB_.R.transpose() * (state_.imu.p_WB - image_T_WB_.p);
+  const auto P = covariance_.matrix();
+  motion.sigma_p = dt * std::sqrt(P.diagonal().segment<3>(err::nu).maxCoeff());
+  return frame_check_.compare(last_features_, frame, motion, state_.camera);
+}
+
+/// The state is at the frame's time.
+void Filter::use_image(const FeatureFrame& frame, bool still) {
   if (still && clone_is_here_) {
     hold_still();
   } else {
@@ -290,15 +331,54 @@ std::optional<Estimate> Filter::process(const FeatureFrame& frame) {
   }
   image_T_WB_ = {state_.imu.R_WB, state_.imu.p_WB};
   statistics_.clones = static_cast<int>(state_.clones.size());
-  return make_estimate();
 }
+
+/// What is said of the state, and whether it is given away.
+std::optional<Estimate> Filter::finish_frame(bool image, const FrameAgreement& agreement) {
+  HealthMonitor::Frame frame;
+  frame.t_ns = imu_time(last_frame_ns_);
+  frame.image = image;
+  frame.running = status_ == Status::tracking;
+  frame.agreement = agreement;
+  frame.statistics = statistics_;
+  frame.lifted = lifted_ns_ && seconds_between(*lifted_ns_, frame.t_ns) < kLifting;
+  std::optional<Estimate> estimate;
+  if (frame.running) {
+    estimate = make_estimate();
+    const NavState& x = estimate->state;
+    frame.finite = x.q_WB.coeffs().allFinite() && x.p_WB.allFinite() && x.v_W.allFinite() && x.b_g.allFinite() &&
+                   x.b_a.allFinite() && estimate->covariance.allFinite();
+    const auto variance = estimate->covariance.diagonal().cwiseMax(0.0);
+    frame.velocity_sigma = std::sqrt(variance.segment<3>(estimate_error::velocity).maxCoeff());
+    frame.horizontal_sigma = std::sqrt(variance.segment<2>(estimate_error::position).maxCoeff());
+    frame.vertical_sigma = std::sqrt(variance(estimate_error::position + 2));
+  }
+  monitor_.add_frame(frame, log_.records(), imu_.newest().t_ns);
+  if (frame.running && !frame.finite) stop();
+  if (!estimate || !usable()) return std::nullopt;
+  estimate->health = monitor_.health();
+  if (estimate->health.aiding != Aiding::none) last_good_ = estimate;
+  return estimate;
+}
+
+void Filter::refuse_frame(TimeNs t_ns) {
+  if (!imu_.empty()) monitor_.add_refused_frame(imu_time(t_ns), imu_.newest().t_ns);
+}
+
+/// May the state be given away?
+bool Filter::usable() const {
+  const HealthStatus status = monitor_.health().status;
+  return status_ == Status::tracking && (status == HealthStatus::tracking || status == HealthStatus::degraded);
+}
+
+Status Filter::status() const { return status_ == Status::tracking && monitor_.lost() ? Status::lost : status_; }
 
 std::optional<Estimate> Filter::process_without_image(TimeNs t_ns) {
   if (!covers(t_ns) || !is_next(t_ns)) return std::nullopt;
   FeatureFrame nothing;
   nothing.t_ns = t_ns;
   const bool still = begin_frame(nothing);
-  if (status_ != Status::tracking) return std::nullopt;
+  if (status_ != Status::tracking) return finish_frame(false, FrameAgreement{});
 
   if (still && clone_is_here_) {
     hold_still();
@@ -309,7 +389,7 @@ std::optional<Estimate> Filter::process_without_image(TimeNs t_ns) {
     clone_is_here_ = false;
   }
   statistics_.clones = static_cast<int>(state_.clones.size());
-  return make_estimate();
+  return finish_frame(false, FrameAgreement{});
 }
 
 /// What comes before anything is done with the features: start if possible, propagate. Does the vehicle stand?
@@ -318,6 +398,7 @@ bool Filter::begin_frame(const FeatureFrame& frame) {
   last_frame_ns_ = frame.t_ns;
   statistics_ = FrameStatistics{};
   consistency_ = Consistency{};
+  log_.start_frame();
   statistics_.tracks = static_cast<int>(frame.features.size());
   statistics_.stereo = static_cast<int>(std::count_if(frame.features.begin(), frame.features.end(),
                                                       [](const FeatureObservation& f) { return f.has_right; }));
@@ -330,9 +411,50 @@ bool Filter::begin_frame(const FeatureFrame& frame) {
                                         on_ground() ? wheel_rest_.duration(t_ns, kWheelAge) : std::nullopt);
   contact_.set_gyro_bias(state_.imu.b_g);
   statistics_.on_ground = on_ground();
-  if (started) compare_sensors(frame, t_ns);
-  if (started || try_start(t_ns, imu, still) || try_rolling_start()) advance_measuring(t_ns);
+  if (started) {
+    compare_sensors(frame, t_ns);
+    advance_measuring(t_ns);
+    start_again(frame);
+  } else if (try_start(t_ns, imu, still) || try_rolling_start() || try_moving_start(frame)) {
+    moving_start_.clear();
+    advance_measuring(t_ns);
+  }
   return still;
+}
+
+/// While lost, the state goes on, and is good again if the cameras come to agree with it. Where they do not, but agree
+/// with the inertial samples, it is the state that is wrong, and begins anew.
+void Filter::start_again(const FeatureFrame& frame) {
+  if (!monitor_.lost()) {
+    moving_start_.clear();
+    return;
+  }
+  if (frame.features.empty() || calibration_.cameras.size() < 2) return;
+  const CameraState given = camera_state(calibration_);  // what was learned may be as wrong as the rest
+  const auto offset_ns = static_cast<TimeNs>(std::llround(1e9 * given.time_offset));
+  moving_start_.add(frame.t_ns + offset_ns, frame, imu_, given);
+  if (!monitor_.contradicted() || !moving_start_.solve(imu_)) return;
+  stop();
+  if (begin_moving()) advance_measuring(imu_time(frame.t_ns));
+}
+
+/// Nothing of the state is used any more.
+void Filter::stop() {
+  status_ = Status::lost;
+  state_.imu = ImuState{};
+  state_.clones.clear();
+  state_.camera = camera_state(calibration_);
+  state_.odometer = odometer_state(calibration_);
+  state_.ground = GroundState{};
+  tracks_.clear();
+  turns_.clear();
+  ranges_.clear();
+  displacement_.reset();
+  displacement_turns_.clear();
+  agrees_since_ns_.fill(0);
+  ground_known_ = false;
+  clone_is_here_ = false;
+  camera_displacement_.clear();
 }
 
 /// Before anything of the interval up to t_ns is used: how far the body goes in it, told by each sensor alone.
@@ -379,8 +501,8 @@ double Filter::trust(MotionSensor sensor) const {
 
 /// Standing: the mean specific force is gravity, the mean rate is the gyroscope's bias.
 bool Filter::try_start(TimeNs t_ns, const ImuStatistics& imu, bool still) {
-  status_ = imu.count < 2 ? Status::waiting_for_imu : Status::waiting_for_standstill;
-  if (!still) return false;
+  if (status_ != Status::lost) status_ = imu.count < 2 ? Status::waiting_for_imu : Status::waiting_for_standstill;
+  if (!still || imu.count < 2) return false;
 
   ImuState& x = state_.imu;
   x = ImuState{};
@@ -407,6 +529,7 @@ bool Filter::try_start(TimeNs t_ns, const ImuStatistics& imu, bool still) {
   H.block<3, 3>(3, err::b_g) = Eigen::Matrix3d::Identity() / gyro_sigma;
   r.tail<3>() = (imu.gyro_mean - x.b_g) / gyro_sigma;
   update(H, 0, r);
+  join_worlds();
   return true;
 }
 
@@ -421,7 +544,66 @@ bool Filter::try_rolling_start() {
   sigma.segment<3>(err::nu).setConstant(kRollingVelocity * (1.0 + start->v_W.norm()));
   covariance_.reset(sigma);
   status_ = Status::tracking;
+  join_worlds();
   return true;
+}
+
+/// Moving, with two cameras.
+bool Filter::try_moving_start(const FeatureFrame& frame) {
+  if (calibration_.cameras.size() < 2 || frame.features.empty()) return false;
+  moving_start_.add(imu_time(frame.t_ns), frame, imu_, state_.camera);
+  return begin_moving();
+}
+
+/// Begin where the window of frames begins, near what explains them, and take them in from there; all but the last,
+/// which is the frame at hand.
+bool Filter::begin_moving() {
+  const std::optional<ImuState> start = moving_start_.solve(imu_);
+  if (!start) return false;
+  state_.imu = *start;
+  Eigen::VectorXd sigma = start_sigma();
+  sigma.segment<3>(err::nu).setConstant(kRollingVelocity * (1.0 + start->v_W.norm()));
+  covariance_.reset(sigma);
+  status_ = Status::tracking;
+  while (!turns_.empty() && turns_.front().from_ns < start->t_ns) turns_.pop();
+  while (!ranges_.empty() && ranges_.front().t_ns < start->t_ns) ranges_.pop();
+  join_worlds();
+  const FrameStatistics statistics = statistics_;
+  const std::vector<MovingStart::TimedFrame>& frames = moving_start_.frames();
+  for (std::size_t i = 0; i + 1 < frames.size(); ++i) {
+    advance_measuring(frames[i].t_ns);
+    use_image(frames[i].features, false);
+  }
+  statistics_ = statistics;
+  moving_start_.clear();
+  return true;
+}
+
+/// After a start that is not the first: the vehicle is where it was last known to be, less and less certainly; the
+/// gyroscope tells how it turned since.
+void Filter::join_worlds() {
+  if (!last_good_) return;
+  NavState last = last_good_->state;
+  const auto variance = last_good_->covariance.diagonal().cwiseMax(0.0);
+  const TimeNs from_ns = std::min(last.t_ns, state_.imu.t_ns);
+  const TimeNs to_ns = std::max(last.t_ns, state_.imu.t_ns);
+  const double since = seconds_between(from_ns, to_ns);
+  double yaw_variance = variance(estimate_error::rotation + 2);
+  if (imu_[0].t_ns <= from_ns) {
+    Eigen::Matrix3d turned = Eigen::Matrix3d::Identity();
+    imu_.for_each_piece(from_ns, to_ns, [&](const Eigen::Vector3d& gyro_B, const Eigen::Vector3d&, double dt) {
+      turned *= exp_so3((gyro_B - last.b_g) * dt);
+    });
+    last.q_WB =
+        last.q_WB * Eigen::Quaterniond(last.t_ns <= state_.imu.t_ns ? turned : Eigen::Matrix3d(turned.transpose()));
+    yaw_variance += since * since * variance.segment<3>(estimate_error::gyro_bias).maxCoeff() +
+                    since * calibration_.imu.gyro_noise * calibration_.imu.gyro_noise;
+  } else {
+    yaw_variance = M_PI * M_PI / 3.0;
+  }
+  const double way = since * (last.v_W.norm() + kUnseenSpeed);
+  const double position_sigma = std::sqrt(variance.segment<3>(estimate_error::position).maxCoeff() + way * way);
+  anchor_ = Anchor::join(last, predict_here(state_.imu.t_ns), std::sqrt(yaw_variance), position_sigma);
 }
 
 /// Standard deviations of the whole error vector before gravity and biases were measured.
@@ -557,6 +739,7 @@ void Filter::update_with_wheels(const WheelTurn& turn) {
                odometer.side_slip_turn * yaw_rate),
       root_sum(WheelRows::slope, odometer.speed_sigma, odometer.roughness * per_root_metre, 0.0),
       root_sum(WheelRows::yaw_rate, odometer.yaw_rate_sigma, count_noise * 2.0 / state_.odometer.wheel_separation, 0.0);
+  log_wheels(rows, sigma, turn.to_ns);
 
   const bool use_yaw_rate = odometer.model == OdometerModel::differential || odometer.yaw_rate;
   const bool slope_known = odometer.model != OdometerModel::terrain || beam_count_ == 0 || ground_known_;
@@ -569,6 +752,7 @@ void Filter::update_with_wheels(const WheelTurn& turn) {
     if (!use[static_cast<std::size_t>(row)]) continue;
     const double variance = covariance_.variance(rows.H.row(row), err::nu) + sigma(row) * sigma(row);
     const bool passes = rows.residual(row) * rows.residual(row) <= gate_(1) * variance;
+    if (row == WheelRows::slope && !passes) lifted_ns_ = turn.to_ns;
     if (!agrees_again(agrees_since_ns_[static_cast<std::size_t>(row)], passes, turn.to_ns)) {
       ++statistics_.wheel_rows_rejected;
       continue;
@@ -614,6 +798,19 @@ bool Filter::choose_wheels(WheelRows& rows, Eigen::Vector4d& sigma, const WheelT
   rows = one[believed[0] ? 0 : 1];
   sigma(WheelRows::speed) = sigma_one;
   return true;
+}
+
+/// Each wheel by itself: the axle's speed and turn tell how fast it should roll.
+void Filter::log_wheels(const WheelRows& rows, const Eigen::Matrix<double, WheelRows::size, 1>& sigma, TimeNs t_ns) {
+  const double lever = 0.5 * state_.odometer.wheel_separation;
+  for (const Source wheel : {Source::wheel_left, Source::wheel_right}) {
+    const double side = wheel == Source::wheel_left ? -lever : lever;
+    const Eigen::Matrix<double, 1, kGroundColumns> H =
+        rows.H.row(WheelRows::speed) + side * rows.H.row(WheelRows::yaw_rate);
+    const double noise = std::hypot(sigma(WheelRows::speed), side * sigma(WheelRows::yaw_rate));
+    const double innovation = rows.residual(WheelRows::speed) + side * rows.residual(WheelRows::yaw_rate);
+    log_.add(wheel, innovation, covariance_.variance(H, err::nu) + noise * noise, gate_(1), t_ns);
+  }
 }
 
 /// From the newest clone, which is here and now.
@@ -698,7 +895,9 @@ void Filter::update_with_beams(const BeamRanges& reading) {
     h.segment<2>(ground_column(err::normal)) = z.H_normal;
     h(ground_column(err::beams) + i) = z.H_tilt;
     const double residual = range - z.range;
-    if (!(residual * residual <= gate_(1) * (covariance_.variance(h, err::nu) + sigma * sigma))) {
+    const double variance = covariance_.variance(h, err::nu) + sigma * sigma;
+    log_.add(beam_source(beam), residual, variance, gate_(1), reading.t_ns);
+    if (!(residual * residual <= gate_(1) * variance)) {
       ++statistics_.beams_rejected;
       continue;
     }
@@ -765,7 +964,7 @@ void Filter::append_clone() {
   J_offset << rate_W, x.v_W + x.p_WB.cross(rate_W);
   covariance_.append_clone(J_imu, J_offset);
   state_.clones.push_back({next_frame_++, {x.R_WB, x.p_WB}, 1.0 / trust(MotionSensor::camera)});
-  learn_calibration_ = true;
+  learn_calibration_ = !monitor_.health().untrusted[index_of(Source::camera_left)];
   clone_is_here_ = true;
 }
 
@@ -781,11 +980,14 @@ void Filter::update_with_features(const FeatureFrame& frame, std::optional<std::
   select_tracks(frame, oldest_leaves ? std::optional(state_.clones.front().frame) : std::nullopt);
 
   information_.start(state_.error_size());
+  camera_squares_.fill(0.0);
+  camera_observations_.fill(0);
   camera_poses(state_, cameras_);
   for (const std::size_t i : selected_) {
     ++(add_track(tracks_[i]) ? statistics_.features_used : statistics_.features_rejected);
     tracks_[i].observations.clear();  // each observation is used once
   }
+  log_features();
   information_.compress();
   if (information_.residual().size() > 0) update(information_.H(), err::camera, information_.residual());
 
@@ -793,6 +995,19 @@ void Filter::update_with_features(const FeatureFrame& frame, std::optional<std::
   tracks_.keep_if([&](const Track& track) {
     return !track.observations.empty() && std::binary_search(frame_ids_.begin(), frame_ids_.end(), track.id);
   });
+}
+
+/// What both cameras saw of this frame's features, against where they were found to be.
+void Filter::log_features() {
+  for (std::size_t camera = 0; camera < calibration_.cameras.size(); ++camera) {
+    if (camera_observations_[camera] == 0) continue;
+    SourceLog::Features features;
+    features.used = statistics_.features_used;
+    features.rejected = statistics_.features_rejected;
+    features.rms_px = std::sqrt(camera_squares_[camera] / camera_observations_[camera]);
+    features.variance_px2 = config_.feature_sigma_px * config_.feature_sigma_px;
+    log_.add(camera == 0 ? Source::camera_left : Source::camera_right, features, gate_(1), state_.imu.t_ns);
+  }
 }
 
 /// Tracks that ended with this frame, and those that reach back to the clone that leaves; the longest first.
@@ -832,11 +1047,17 @@ bool Filter::add_track(const Track& track) {
   observations_.clear();
   for (const TrackObservation& o : track.observations) {
     const int clone = clone_index(o.frame);
-    observations_.push_back(linearize_observation(state_, clone, 0, *point, o.left));
-    if (o.has_right) observations_.push_back(linearize_observation(state_, clone, 1, *point, o.right));
+    add_observation(clone, 0, *point, o.left);
+    if (o.has_right) add_observation(clone, 1, *point, o.right);
   }
   return information_.add(observations_, config_.feature_sigma_px / focal_px_,
                           config_.huber_px / config_.feature_sigma_px, covariance_.matrix(), gate_);
+}
+
+void Filter::add_observation(int clone, std::size_t camera, const InverseDepthPoint& point, const Eigen::Vector2d& uv) {
+  observations_.push_back(linearize_observation(state_, clone, static_cast<int>(camera), point, uv));
+  camera_squares_[camera] += focal_px_ * focal_px_ * observations_.back().residual.squaredNorm();
+  camera_observations_[camera] += 2;
 }
 
 /// With a full window, the clone before the newest goes if it shows little that its elder does not; else the oldest.
@@ -892,7 +1113,11 @@ int Filter::clone_index(std::uint64_t frame) const {
 }
 
 std::optional<NavState> Filter::predict(TimeNs t_ns) const {
-  if (status_ != Status::tracking) return std::nullopt;
+  if (!usable()) return std::nullopt;
+  return anchor_.to_world(predict_here(t_ns));
+}
+
+NavState Filter::predict_here(TimeNs t_ns) const {
   ImuState x = state_.imu;
   if (t_ns > x.t_ns) {
     imu_.for_each_piece(x.t_ns, t_ns, [&](const Eigen::Vector3d& gyro_B, const Eigen::Vector3d& accel_B, double dt) {
@@ -907,11 +1132,13 @@ std::optional<NavState> Filter::predict(TimeNs t_ns) const {
 Estimate Filter::make_estimate() const {
   const ImuState& x = state_.imu;
   Estimate estimate;
-  estimate.state = *predict(x.t_ns);
+  const NavState here = predict_here(x.t_ns);
+  estimate.state = anchor_.to_world(here);
   ImuErrorMatrix T = ImuErrorMatrix::Identity();
   T.block<3, 3>(estimate_error::velocity, err::theta) = -skew(x.v_W);
   T.block<3, 3>(estimate_error::position, err::theta) = -skew(x.p_WB);
-  estimate.covariance = T * covariance_.matrix().topLeftCorner<err::imu_size, err::imu_size>() * T.transpose();
+  estimate.covariance =
+      anchor_.to_world(T * covariance_.matrix().topLeftCorner<err::imu_size, err::imu_size>() * T.transpose(), here);
   estimate.frame = statistics_;
   estimate.consistency = consistency_;
   if (ground_known_) {

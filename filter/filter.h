@@ -14,15 +14,20 @@
 #include "ear/filter_config.h"
 #include "ear/odometry.h"
 #include "ear/types.h"
+#include "filter/anchor.h"
 #include "filter/camera_displacement.h"
 #include "filter/chi_squared.h"
 #include "filter/consistency.h"
 #include "filter/contact.h"
 #include "filter/covariance.h"
 #include "filter/feature_update.h"
+#include "filter/frame_check.h"
+#include "filter/health_monitor.h"
 #include "filter/impact_guard.h"
 #include "filter/imu_buffer.h"
+#include "filter/moving_start.h"
 #include "filter/ring.h"
+#include "filter/source_log.h"
 #include "filter/standstill.h"
 #include "filter/state.h"
 #include "filter/tracks.h"
@@ -65,7 +70,10 @@ class Filter {
   /// The newest state carried on by the samples to `t_ns` (IMU time). Nothing before the start.
   [[nodiscard]] std::optional<NavState> predict(TimeNs t_ns) const;
 
-  [[nodiscard]] Status status() const { return status_; }
+  [[nodiscard]] Status status() const;
+  [[nodiscard]] const Health& health() const { return monitor_.health(); }
+  /// Tells the health of a frame that no inertial samples reach.
+  void refuse_frame(TimeNs t_ns);
   [[nodiscard]] const InputCounts& input_counts() const { return counts_; }  ///< of samples; frames are the caller's
   [[nodiscard]] bool covers(TimeNs t_ns) const;   ///< are there inertial samples (nearly) up to the frame's time?
   [[nodiscard]] bool is_next(TimeNs t_ns) const;  ///< is a frame with this stamp later than the one before?
@@ -91,15 +99,27 @@ class Filter {
   void mend_spike(const ImuSample& next);
   bool try_start(TimeNs t_ns, const ImuStatistics& imu, bool still);
   bool try_rolling_start();
+  bool try_moving_start(const FeatureFrame& frame);
+  bool begin_moving();
+  void start_again(const FeatureFrame& frame);
+  void join_worlds();
+  void stop();
   [[nodiscard]] Eigen::VectorXd start_sigma() const;
   bool begin_frame(const FeatureFrame& frame);
   void compare_sensors(const FeatureFrame& frame, TimeNs t_ns);
   [[nodiscard]] Displacement displacement_by_wheels(TimeNs until_ns) const;
   [[nodiscard]] WheelNoise wheel_noise() const;
   [[nodiscard]] double trust(MotionSensor sensor) const;
+  [[nodiscard]] FrameAgreement check_frame(const FeatureFrame& frame);
+  void use_image(const FeatureFrame& frame, bool still);
+  [[nodiscard]] std::optional<Estimate> finish_frame(bool image, const FrameAgreement& agreement);
+  [[nodiscard]] NavState predict_here(TimeNs t_ns) const;
+  [[nodiscard]] bool usable() const;
   void advance(TimeNs t_ns);
   void advance_measuring(TimeNs t_ns);
   [[nodiscard]] Motion motion_at(TimeNs t_ns) const;
+  void log_wheels(const WheelRows& rows, const Eigen::Matrix<double, WheelRows::size, 1>& sigma, TimeNs t_ns);
+  void log_features();
   void note_contact(ContactEvent event);
   [[nodiscard]] bool on_ground() const { return encoder_ && contact_.mode() == ContactMode::ground; }
   [[nodiscard]] bool rolls_at(TimeNs t_ns) const;
@@ -116,6 +136,7 @@ class Filter {
   void make_room(std::optional<std::size_t> leaving);
   void update_with_features(const FeatureFrame& frame, std::optional<std::size_t> leaving);
   bool add_track(const Track& track);
+  void add_observation(int clone, std::size_t camera, const InverseDepthPoint& point, const Eigen::Vector2d& uv);
   void select_tracks(const FeatureFrame& frame, std::optional<std::uint64_t> leaving);
   [[nodiscard]] std::optional<std::size_t> clone_to_leave() const;
   [[nodiscard]] double median_parallax_px(const Clone& from, const Clone& to) const;
@@ -155,8 +176,9 @@ class Filter {
   std::uint64_t next_frame_ = 0;
   TimeNs last_frame_ns_ = 0;  ///< camera stamp of the last frame processed
   bool any_frame_ = false;
-  Pose image_T_WB_;           ///< body at the last image
-  TimeNs last_image_ns_ = 0;  ///< its camera stamp
+  Pose image_T_WB_;             ///< body at the last image
+  TimeNs last_image_ns_ = 0;    ///< its camera stamp
+  FeatureFrame last_features_;  ///< its features
   bool any_image_ = false;
   bool clone_is_here_ = false;      ///< the newest clone was made where the vehicle is, if it stands
   bool learn_calibration_ = false;  ///< standing tells nothing about it
@@ -165,6 +187,15 @@ class Filter {
   CameraDisplacement camera_displacement_;
   Consistency consistency_;  ///< over the interval that ends with the frame at hand
   TimeNs compared_ns_ = 0;   ///< where that ends
+  FrameCheck frame_check_;
+  HealthMonitor monitor_;
+  MovingStart moving_start_;
+  std::optional<TimeNs> lifted_ns_;           ///< when the velocity last did not lie in the ground
+  Anchor anchor_;                             ///< of the state's world in that of the estimates
+  std::optional<Estimate> last_good_;         ///< the last estimate that rested on more than inertia
+  SourceLog log_;                             ///< what each sensor measured, against what was expected
+  std::array<double, 2> camera_squares_{};    ///< of this frame's features: residuals of either camera [px^2]
+  std::array<int, 2> camera_observations_{};  ///< how many of them, one for each axis
 
   FeatureInformation information_;
   std::vector<CameraPose> cameras_;

@@ -329,6 +329,8 @@ ear_status ear_status_of(const ear_odometry* odometry) {
       return EAR_WAITING_FOR_STANDSTILL;
     case ear::Status::tracking:
       return EAR_TRACKING;
+    case ear::Status::lost:
+      return EAR_LOST;
   }
   return EAR_WAITING_FOR_IMU;
 }

@@ -97,6 +97,7 @@ class Odometry::Impl {
     }
     if (!filter_.covers(t_ns)) {
       ++frames_without_imu_;
+      filter_.refuse_frame(t_ns);
       return false;
     }
     return true;
@@ -149,6 +150,7 @@ std::optional<Estimate> Odometry::step(TimeNs t_ns) { return impl_->step(t_ns); 
 std::optional<Estimate> Odometry::add_stereo(const StereoFrame& frame) { return impl_->add_stereo(frame); }
 std::optional<NavState> Odometry::predict(TimeNs t_ns) const { return impl_->filter().predict(t_ns); }
 Status Odometry::status() const { return impl_->filter().status(); }
+Health Odometry::health() const { return impl_->filter().health(); }
 InputCounts Odometry::input_counts() const { return impl_->input_counts(); }
 StageTimes Odometry::stage_times() const { return impl_->stage_times(); }
 Calibration Odometry::calibration() const { return impl_->calibration(); }

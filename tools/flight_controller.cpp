@@ -78,7 +78,7 @@ std::string FlightController::report() const {
   return line.data();
 }
 
-void FlightController::announce(mavlink::Health health) {
+void FlightController::announce(mavlink::LinkHealth health) {
   if (health == announced_) return;
   announced_ = health;
   link_.set_state(mavlink::to_system_state(health));

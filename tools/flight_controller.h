@@ -42,12 +42,12 @@ class FlightController {
   [[nodiscard]] std::string report() const;
 
  private:
-  void announce(mavlink::Health health);
+  void announce(mavlink::LinkHealth health);
 
   RealTimeClock clock_;
   mavlink::OdometryStream stream_;
   std::optional<TimeNs> last_imu_ns_;
-  mavlink::Health announced_ = mavlink::Health::starting;
+  mavlink::LinkHealth announced_ = mavlink::LinkHealth::starting;
   mavlink::Link link_;  ///< last: its thread reads the clock
 };
 

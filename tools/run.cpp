@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "src/health_text.h"
 #include "src/recording/config_fields.h"
 #include "src/recording/config_file.h"
 #include "src/recording/input_error.h"
@@ -34,6 +35,8 @@ struct RunArguments {
   FlightControllerArguments flight_controller;
 };
 
+constexpr std::size_t kMostChanges = 1000;  // of the health, in summary.json
+
 /// What happened over the whole run.
 struct Totals {
   std::uint64_t frames = 0;
@@ -46,6 +49,13 @@ struct Totals {
   std::uint64_t beams_used = 0;
   std::uint64_t beams_rejected = 0;
   StageTimes times;
+  std::vector<HealthChange> health;
+
+  void add(TimeNs t_ns, const Health& said) {
+    const std::string text = to_text(said);
+    const bool changed = health.empty() || health.back().text != text;
+    if (changed && health.size() < kMostChanges) health.push_back({t_ns, text});
+  }
 
   void add(const ReplayedFrame& frame, const StageTimes& stages) {
     ++frames;
@@ -72,9 +82,11 @@ const char* status_text(Status status) {
     case Status::waiting_for_imu:
       return "waiting for inertial samples";
     case Status::waiting_for_standstill:
-      return "cannot start yet: it starts from standing, and the vehicle moves";
+      return "cannot start yet: the vehicle moves, and there are neither two cameras nor wheels that tell how fast";
     case Status::tracking:
       return "tracking";
+    case Status::lost:
+      return "lost: waiting to start again";
   }
   return "";
 }
@@ -89,8 +101,9 @@ std::string progress_line(const ReplayedFrame& frame, const Odometry& odometry, 
   const std::size_t rest = line.size() - static_cast<std::size_t>(length);
   if (frame.estimate) {
     const Eigen::Vector3d& p = frame.estimate->state.p_WB;
-    std::snprintf(end, rest, "position %7.2f %7.2f %6.2f m  tracks %3d  %s", p.x(), p.y(), p.z(),
-                  frame.estimate->frame.tracks, frame.estimate->frame.standing ? "standing" : "moving");
+    std::snprintf(end, rest, "position %7.2f %7.2f %6.2f m  tracks %3d  %s  %s", p.x(), p.y(), p.z(),
+                  frame.estimate->frame.tracks, frame.estimate->frame.standing ? "standing" : "moving",
+                  to_text(frame.estimate->health).c_str());
   } else {
     std::snprintf(end, rest, "%s", status_text(odometry.status()));
   }
@@ -123,6 +136,7 @@ RunSummary summarize(const RunArguments& args, const Recording& recording, const
   const StageTimes& t = totals.times;
   summary.stage_times_s = {{"pyramid", t.pyramid}, {"track", t.track},   {"detect", t.detect},
                            {"stereo", t.stereo},   {"reject", t.reject}, {"filter", t.filter}};
+  summary.health = totals.health;
   summary.warnings = recording.warnings();
   const Calibration learned = odometry.calibration();
   if (!learned.cameras.empty()) summary.calibration.emplace_back("camera_time_offset", learned.camera_time_offset);
@@ -167,6 +181,7 @@ void run(const RunArguments& args) {
   const auto on_frame = [&](const ReplayedFrame& frame) {
     if (flight_controller) flight_controller->after_frame(frame, odometry);
     totals.add(frame, odometry.stage_times());
+    totals.add(frame.t_ns, odometry.health());
     if (frame.estimate) {
       trajectory.write(*frame.estimate);
       states.write(*frame.estimate);

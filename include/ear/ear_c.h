@@ -152,8 +152,10 @@ ear_result ear_add_stereo(ear_odometry* odometry, const ear_stereo_frame* frame)
 
 typedef enum {
   EAR_WAITING_FOR_IMU = 0,
-  EAR_WAITING_FOR_STANDSTILL = 1, /* the vehicle moves, and has no wheels on the ground to start rolling with */
-  EAR_TRACKING = 2
+  EAR_WAITING_FOR_STANDSTILL =
+      1, /* the vehicle moves, and has neither wheels on the ground nor two cameras to start with */
+  EAR_TRACKING = 2,
+  EAR_LOST = 3 /* there was an estimate; it may be anywhere now, and starts again as it can */
 } ear_status;
 
 typedef struct {

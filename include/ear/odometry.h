@@ -18,6 +18,7 @@
 
 #include "ear/calibration.h"
 #include "ear/config.h"
+#include "ear/health.h"
 #include "ear/types.h"
 
 namespace ear {
@@ -25,8 +26,9 @@ namespace ear {
 /// Where the estimator is in its life.
 enum class Status : std::uint8_t {
   waiting_for_imu,         ///< too few inertial samples yet
-  waiting_for_standstill,  ///< the vehicle moves, and has no wheels on the ground to start rolling with
-  tracking
+  waiting_for_standstill,  ///< the vehicle moves, and has neither wheels on the ground nor two cameras to start with
+  tracking,
+  lost  ///< there was an estimate; it may be anywhere now (Health::status), and starts again as it can
 };
 
 /// Order of the error vector of Estimate::covariance, 3 components each. Ordinary errors, not the filter's own:
@@ -93,6 +95,7 @@ struct Estimate {
   TerrainEstimate terrain;
   FrameStatistics frame;
   Consistency consistency;
+  Health health;
 };
 
 /// What was refused or bridged since the start; nothing is lost silently.
@@ -132,10 +135,12 @@ class Odometry {
   /// while its images do not come.
   std::optional<Estimate> step(TimeNs t_ns);
 
-  /// The newest state, carried on by the inertial samples that came since. Nothing before the start.
+  /// The newest state, carried on by the inertial samples that came since. Nothing before the start, and while lost.
   [[nodiscard]] std::optional<NavState> predict(TimeNs t_ns) const;
 
   [[nodiscard]] Status status() const;
+  /// The same as in the last estimate, and what changed since: also where there is no estimate.
+  [[nodiscard]] Health health() const;
   [[nodiscard]] InputCounts input_counts() const;
   [[nodiscard]] StageTimes stage_times() const;
 

@@ -24,28 +24,28 @@ int messages_per_frame(double frame_interval) {
 
 }  // namespace
 
-StatusText to_text(Health health) {
+StatusText to_text(LinkHealth health) {
   switch (health) {
-    case Health::starting:
+    case LinkHealth::starting:
       return {Severity::notice, "ear: not started"};
-    case Health::good:
+    case LinkHealth::good:
       return {Severity::notice, "ear: tracking"};
-    case Health::weak:
+    case LinkHealth::weak:
       return {Severity::warning, "ear: tracking, but few features in view"};
-    case Health::lost:
+    case LinkHealth::lost:
       return {Severity::critical, "ear: lost, no odometry"};
   }
   return {};
 }
 
-SystemState to_system_state(Health health) {
+SystemState to_system_state(LinkHealth health) {
   switch (health) {
-    case Health::starting:
+    case LinkHealth::starting:
       return SystemState::calibrating;
-    case Health::good:
-    case Health::weak:
+    case LinkHealth::good:
+    case LinkHealth::weak:
       return SystemState::active;
-    case Health::lost:
+    case LinkHealth::lost:
       return SystemState::critical;
   }
   return SystemState::critical;
@@ -71,11 +71,11 @@ void OdometryStream::add_imu(const ImuSample& sample) {
 
 std::optional<OdometryMessage> OdometryStream::add_frame(const std::optional<Estimate>& estimate, Status status) {
   if (estimate && is_supported(estimate->frame)) last_supported_ns_ = estimate->state.t_ns;
-  const Health before = health_;
+  const LinkHealth before = health_;
   health_ = health_after(estimate, status);
-  if (health_ == Health::lost) last_.reset();
-  if (!estimate || health_ == Health::lost) return std::nullopt;
-  if (before == Health::lost) ++reset_counter_;
+  if (health_ == LinkHealth::lost) last_.reset();
+  if (!estimate || health_ == LinkHealth::lost) return std::nullopt;
+  if (before == LinkHealth::lost) ++reset_counter_;
 
   frame_interval_.reset();
   if (last_) frame_interval_ = seconds_between(last_->state.t_ns, estimate->state.t_ns);
@@ -95,14 +95,14 @@ bool OdometryStream::wants_prediction(TimeNs t_ns) const {
 
 OdometryMessage OdometryStream::add_prediction(const NavState& state) { return make_message(state); }
 
-Health OdometryStream::health_after(const std::optional<Estimate>& estimate, Status status) const {
+LinkHealth OdometryStream::health_after(const std::optional<Estimate>& estimate, Status status) const {
   if (!estimate) {
     // One frame that could not be used, or an estimator that gave up?
-    return status == Status::tracking || health_ == Health::starting ? health_ : Health::lost;
+    return status == Status::tracking || health_ == LinkHealth::starting ? health_ : LinkHealth::lost;
   }
-  if (seconds_between(last_supported_ns_, estimate->state.t_ns) > kMaxUnsupported) return Health::lost;
+  if (seconds_between(last_supported_ns_, estimate->state.t_ns) > kMaxUnsupported) return LinkHealth::lost;
   const int quality = quality_of(estimate->frame);
-  return quality < (health_ == Health::weak ? kGoodQuality : kWeakQuality) ? Health::weak : Health::good;
+  return quality < (health_ == LinkHealth::weak ? kGoodQuality : kWeakQuality) ? LinkHealth::weak : LinkHealth::good;
 }
 
 OdometryMessage OdometryStream::make_message(const NavState& state) {

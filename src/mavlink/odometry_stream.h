@@ -15,15 +15,15 @@
 namespace ear::mavlink {
 
 /// What the pilot is told of.
-enum class Health : std::uint8_t {
+enum class LinkHealth : std::uint8_t {
   starting,  ///< no estimate yet
   good,
   weak,  ///< few features: the estimate drifts sooner
   lost   ///< there was an estimate, and there is none, or inertia alone carries it on
 };
 
-[[nodiscard]] StatusText to_text(Health health);
-[[nodiscard]] SystemState to_system_state(Health health);
+[[nodiscard]] StatusText to_text(LinkHealth health);
+[[nodiscard]] SystemState to_system_state(LinkHealth health);
 
 /// Does anything but inertia hold the estimate: features, wheels on the ground, standing?
 [[nodiscard]] bool is_supported(const FrameStatistics& frame);
@@ -47,17 +47,17 @@ class OdometryStream {
   [[nodiscard]] bool wants_prediction(TimeNs t_ns) const;
   [[nodiscard]] OdometryMessage add_prediction(const NavState& state);
 
-  [[nodiscard]] Health health() const { return health_; }
+  [[nodiscard]] LinkHealth health() const { return health_; }
 
  private:
-  [[nodiscard]] Health health_after(const std::optional<Estimate>& estimate, Status status) const;
+  [[nodiscard]] LinkHealth health_after(const std::optional<Estimate>& estimate, Status status) const;
   [[nodiscard]] OdometryMessage make_message(const NavState& state);
   [[nodiscard]] Eigen::Vector3d rate_B_at(const NavState& state) const;
 
   Eigen::Matrix3d R_BV_;
   double rate_variance_;           ///< of one gyroscope sample [rad^2/s^2]
   std::deque<ImuSample> samples_;  ///< the newest, oldest first: an exposure is older than they are
-  Health health_ = Health::starting;
+  LinkHealth health_ = LinkHealth::starting;
   std::uint8_t reset_counter_ = 0;
 
   std::optional<Estimate> last_;          ///< the last estimate

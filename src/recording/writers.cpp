@@ -152,6 +152,9 @@ void write_summary(const RunSummary& summary, const std::filesystem::path& file)
   for (const auto& [name, seconds] : summary.stage_times_s) json["stage_times_s"][name] = seconds;
   json["calibration"] = nlohmann::ordered_json::object();
   for (const auto& [name, value] : summary.calibration) json["calibration"][name] = value;
+  json["health"] = nlohmann::ordered_json::array();
+  for (const HealthChange& change : summary.health)
+    json["health"].push_back({{"t_ns", change.t_ns}, {"is", change.text}});
   json["warnings"] = to_json(summary.warnings);
   OutputFile(file).write(json.dump(2) + "\n");
 }

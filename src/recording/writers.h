@@ -48,6 +48,12 @@ class StatesWriter {
   OutputFile out_;
 };
 
+/// What the estimator said of itself from some moment on.
+struct HealthChange {
+  TimeNs t_ns = 0;
+  std::string text;
+};
+
 /// What a run read, did and took.
 struct RunSummary {
   std::string recording;
@@ -56,6 +62,7 @@ struct RunSummary {
   double wall_time_s = 0.0;                                   ///< time that the run took [s]
   std::vector<std::pair<std::string, double>> stage_times_s;  ///< whole run, per stage [s]
   std::vector<std::pair<std::string, double>> calibration;    ///< what was learned while running, SI units
+  std::vector<HealthChange> health;                           ///< every change, the first ones of very many
   std::vector<Warning> warnings;
 };
 

@@ -82,7 +82,7 @@ TEST_CASE("mavlink stream: nothing before the start") {
   OdometryStream stream = make_stream();
   CHECK_FALSE(stream.add_frame(std::nullopt, Status::waiting_for_standstill));
   CHECK_FALSE(stream.wants_prediction(at(0.1)));
-  CHECK(stream.health() == Health::starting);
+  CHECK(stream.health() == LinkHealth::starting);
 }
 
 TEST_CASE("mavlink stream: nothing while lost; what comes after counts as a reset") {
@@ -90,25 +90,25 @@ TEST_CASE("mavlink stream: nothing while lost; what comes after counts as a rese
   const auto first = stream.add_frame(estimate_at(0.0), Status::tracking);
   REQUIRE(first);
   CHECK(first->reset_counter == 0);
-  CHECK(stream.health() == Health::good);
+  CHECK(stream.health() == LinkHealth::good);
   (void)stream.add_frame(estimate_at(0.1), Status::tracking);
   CHECK(stream.wants_prediction(at(0.14)));
 
   CHECK_FALSE(stream.add_frame(std::nullopt, Status::waiting_for_standstill));
-  CHECK(stream.health() == Health::lost);
+  CHECK(stream.health() == LinkHealth::lost);
   CHECK_FALSE(stream.wants_prediction(at(0.24)));
 
   const auto again = stream.add_frame(estimate_at(5.0), Status::tracking);
   REQUIRE(again);
   CHECK(again->reset_counter == 1);
-  CHECK(stream.health() == Health::good);
+  CHECK(stream.health() == LinkHealth::good);
 }
 
 TEST_CASE("mavlink stream: one frame that could not be used is not yet a loss") {
   OdometryStream stream = make_stream();
   (void)stream.add_frame(estimate_at(0.0), Status::tracking);
   CHECK_FALSE(stream.add_frame(std::nullopt, Status::tracking));
-  CHECK(stream.health() == Health::good);
+  CHECK(stream.health() == LinkHealth::good);
   const auto next = stream.add_frame(estimate_at(0.1), Status::tracking);
   REQUIRE(next);
   CHECK(next->reset_counter == 0);
@@ -136,7 +136,7 @@ TEST_CASE("mavlink stream: what inertia alone carries on is lost after a quarter
       blind.frame.wheel_rows_used = wheels ? 10 : 0;
       const bool expected = wheels || i <= 5;
       CHECK(stream.add_frame(blind, Status::tracking).has_value() == expected);
-      CHECK((stream.health() == Health::lost) == !expected);
+      CHECK((stream.health() == LinkHealth::lost) == !expected);
       if (!expected) CHECK_FALSE(stream.wants_prediction(at(0.05 * i + 0.025)));
     }
     const auto next = stream.add_frame(estimate_at(1.05), Status::tracking);
@@ -154,14 +154,14 @@ TEST_CASE("mavlink stream: quality and health follow the number of features, wit
   };
   CHECK(after(0.0, 150) == 100);
   CHECK(after(0.1, 12) == 24);
-  CHECK(stream.health() == Health::good);
+  CHECK(stream.health() == LinkHealth::good);
   CHECK(after(0.2, 4) == 8);
-  CHECK(stream.health() == Health::weak);
+  CHECK(stream.health() == LinkHealth::weak);
   CHECK(after(0.3, 12) == 24);
-  CHECK(stream.health() == Health::weak);
+  CHECK(stream.health() == LinkHealth::weak);
   CHECK(after(0.4, 0) == 1);
   CHECK(after(0.5, 20) == 40);
-  CHECK(stream.health() == Health::good);
+  CHECK(stream.health() == LinkHealth::good);
 
   Estimate on_wheels = estimate_at(0.55, 3);
   on_wheels.frame.on_ground = true;
@@ -184,7 +184,7 @@ TEST_CASE("mavlink stream: the variance of the angular rate is the noise of one 
 }
 
 TEST_CASE("mavlink stream: every state of health has a text that fits") {
-  for (const Health health : {Health::starting, Health::good, Health::weak, Health::lost}) {
+  for (const LinkHealth health : {LinkHealth::starting, LinkHealth::good, LinkHealth::weak, LinkHealth::lost}) {
     CHECK_FALSE(to_text(health).text.empty());
     CHECK(to_text(health).text.size() <= StatusText::kMaxLength);
   }

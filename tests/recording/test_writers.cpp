@@ -108,10 +108,13 @@ TEST_CASE("summary: valid JSON with all that was said") {
   summary.counts = {{"frames", 7}, {"estimates", 6}};
   summary.duration_s = 1.5;
   summary.stage_times_s = {{"update", 0.25}};
+  summary.health = {{17, "tracking"}};
   summary.warnings = {{"imu0: torn last line", 1, "data.csv:9: line: 3 fields, not 7"}};
   write_summary(summary, folder / "summary.json");
   const auto json = nlohmann::json::parse(read_text(folder / "summary.json"));
   CHECK(json["recording"] == summary.recording);
+  CHECK(json["health"][0]["t_ns"] == 17);
+  CHECK(json["health"][0]["is"] == "tracking");
   CHECK(json["counts"]["estimates"] == 6);
   CHECK(json["duration_s"] == 1.5);
   CHECK(json["stage_times_s"]["update"] == 0.25);

@@ -1,0 +1,29 @@
+// Where the estimator's present world lies in the one that it started in: the two differ after it was lost and started
+// again, by a turn about gravity and a shift that nothing can measure any more.
+#pragma once
+
+#include <Eigen/Core>
+
+#include "ear/odometry.h"
+
+namespace ear {
+
+/// W: the world that the user knows; A: that of the filter since its last start. Both have z up.
+struct Anchor {
+  Eigen::Quaterniond q_WA = Eigen::Quaterniond::Identity();  ///< a turn about z
+  Eigen::Vector3d p_WA = Eigen::Vector3d::Zero();            ///< [m]
+  Eigen::Vector3d start_A = Eigen::Vector3d::Zero();         ///< where the vehicle was at that start [m]
+  double yaw_sigma = 0.0;                                    ///< [rad]
+  double position_sigma = 0.0;                               ///< [m] of start_A in W, each axis
+
+  /// The vehicle as it was last known, in W, and how uncertain that became since: the vehicle `state_A` is now there.
+  static Anchor join(const NavState& last_W, const NavState& state_A, double yaw_sigma, double position_sigma);
+
+  [[nodiscard]] NavState to_world(const NavState& state_A) const;
+  /// The covariance in W: turned, and with what is not known of the anchor itself. `state_A`: that of the estimate.
+  [[nodiscard]] Eigen::Matrix<double, estimate_error::size, estimate_error::size> to_world(
+      const Eigen::Matrix<double, estimate_error::size, estimate_error::size>& covariance_A,
+      const NavState& state_A) const;
+};
+
+}  // namespace ear

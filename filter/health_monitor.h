@@ -1,0 +1,124 @@
+// From what each sensor measured to what the estimator says of itself: which sensors it does not rest on, whether it
+// may be used. It changes no estimate. docs/health.md gives the rules and their times.
+#pragma once
+
+#include <array>
+#include <initializer_list>
+#include <optional>
+
+#include "ear/calibration.h"
+#include "ear/health.h"
+#include "ear/odometry.h"
+#include "filter/frame_check.h"
+
+namespace ear {
+
+/// For and against one source, over time: mostly wrong for kDistrustAfter seconds, it is trusted no more; mostly right
+/// for kTrustAfter, it is again.
+class Trust {
+ public:
+  static constexpr double kDistrustAfter = 0.25;  // [s]
+  static constexpr double kTrustAfter = 0.5;      // [s]
+
+  /// What came since the last call. Long silence counts for `kLongest` seconds at most.
+  void add(bool wrong, TimeNs t_ns);
+  /// Something that never happens to a sound sensor.
+  void accuse(TimeNs t_ns);
+  /// It has nothing to say, rightly.
+  void excuse(TimeNs t_ns);
+
+  [[nodiscard]] bool trusted() const { return trusted_; }
+  [[nodiscard]] TimeNs onset_ns() const { return onset_ns_; }
+
+ private:
+  double doubt_ = 0.0;    ///< 0 ... 1
+  bool doubted_ = false;  ///< since onset_ns_
+  bool trusted_ = true;
+  TimeNs onset_ns_ = 0;
+  std::optional<TimeNs> last_ns_;
+};
+
+/// By how much a sensor's stamps are off those of the inertial samples, against what is usual.
+class StampWatch {
+ public:
+  /// A stamp, and that of the newest inertial sample. Is the difference an unusual one?
+  bool add(TimeNs stamp_ns, TimeNs imu_ns);
+
+ private:
+  int count_ = 0;
+  double usual_ = 0.0;   ///< [s]
+  double spread_ = 0.0;  ///< [s] mean deviation from it
+};
+
+class HealthMonitor {
+ public:
+  explicit HealthMonitor(const Calibration& calibration, bool uses_wheels, bool uses_beams);
+
+  /// A sample as it comes, before it is used. `refused`: its stamp or its values cannot be.
+  void add_imu(const ImuSample& sample, bool refused, double max_gap);
+  void add_spike(bool gyro, bool accel, TimeNs t_ns);
+  void add_encoder(const EncoderSample& sample, TimeNs imu_ns);
+  void add_laser(const LaserSample& sample, const LaserCalibration& lasers, TimeNs imu_ns);
+
+  /// A frame that no inertial samples reach, or that is not later than the one before; IMU time.
+  void add_refused_frame(TimeNs t_ns, TimeNs imu_ns);
+
+  /// What is known after a frame was used.
+  struct Frame {
+    TimeNs t_ns = 0;       ///< IMU time
+    bool image = true;     ///< false: the estimator moved on without one
+    bool running = false;  ///< there is a state
+    bool finite = true;    ///< and it and its covariance are numbers
+    bool lifted = false;   ///< the vehicle just left the ground or met it, whatever is known of its contact
+    FrameAgreement agreement;
+    FrameStatistics statistics;
+    double velocity_sigma = 0.0;    ///< [m/s] worst axis
+    double horizontal_sigma = 0.0;  ///< [m]
+    double vertical_sigma = 0.0;    ///< [m]
+  };
+  void add_frame(const Frame& frame, const std::array<SourceRecord, kSourceCount>& records, TimeNs newest_imu_ns);
+
+  [[nodiscard]] const Health& health() const { return health_; }
+  [[nodiscard]] bool lost() const { return health_.status == HealthStatus::lost; }
+  /// All sources but the inertial ones contradict the state, for long: it may be the state that is wrong.
+  [[nodiscard]] bool contradicted() const { return contradicted_; }
+
+ private:
+  void judge_cameras(const Frame& frame);
+  void judge_ground(const Frame& frame, const std::array<SourceRecord, kSourceCount>& records);
+  void judge_turn(const Frame& frame);
+  void note_silence(TimeNs t_ns);
+  void decide(TimeNs t_ns);
+  [[nodiscard]] Trust& trust(Source source) { return trust_[index_of(source)]; }
+  [[nodiscard]] bool trusted(Source source) const { return trust_[index_of(source)].trusted(); }
+  [[nodiscard]] int quality(const Frame& frame) const;
+  void accuse(std::initializer_list<Source> sources, TimeNs t_ns);
+
+  std::size_t cameras_;
+  std::size_t beams_;
+  bool wheels_;
+  std::array<Trust, kSourceCount> trust_;
+  Health health_;
+  Frame last_;
+
+  std::optional<ImuSample> last_imu_;
+  std::optional<TimeNs> last_frame_ns_;
+  std::optional<TimeNs> last_refused_imu_ns_;
+  double frame_interval_ = 0.0;  ///< [s] usual
+  TimeNs last_tick_ns_ = 0;
+  std::array<double, kMaxBeams> last_range_{};
+  std::array<int, kMaxBeams> repeated_{};
+  std::array<bool, kMaxBeams> no_return_{};
+  StampWatch camera_stamps_, encoder_stamps_, laser_stamps_;
+  Eigen::Vector3d turn_rate_ = Eigen::Vector3d::Zero();  ///< of the cameras less that of the gyroscope [rad/s], recent
+  double turn_scatter_ = 1e-4;                           ///< [rad^2/s^2] of the single ones
+  bool turns_otherwise_ = false;
+  std::optional<TimeNs> misled_ns_;                 ///< when wheels last did not fit
+  TimeNs last_encoder_ns_ = 0, last_laser_ns_ = 0;  ///< newest inertial stamp when they came
+  bool started_ = false;
+  TimeNs aided_ns_ = 0;
+  TimeNs fitting_ns_ = 0;  ///< when something last did not contradict the state
+  bool contradicted_ = false;
+};
+
+}  // namespace ear

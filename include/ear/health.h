@@ -1,0 +1,73 @@
+// What the estimator says of itself and of its sensors: can a flight controller act on the estimate, and which sensors
+// is it not based on? Meanings, thresholds and times: docs/health.md.
+#pragma once
+
+#include <array>
+#include <bitset>
+#include <cstddef>
+#include <cstdint>
+
+#include "ear/types.h"
+
+namespace ear {
+
+enum class HealthStatus : std::uint8_t {
+  initialising,  ///< there was no estimate yet
+  tracking,      ///< each sensor is trusted, or is rightly silent, as wheels are in flight
+  degraded,      ///< the estimate may be used, but rests on fewer sensors than it should
+  lost           ///< there was an estimate; now it may be anywhere, and none is given
+};
+
+/// What can be wrong by itself.
+enum class Source : std::uint8_t {
+  camera_left,
+  camera_right,
+  wheel_left,
+  wheel_right,
+  beam_0,  ///< lasers in the order of LaserCalibration::beams
+  beam_1,
+  beam_2,
+  gyroscope,
+  accelerometer
+};
+inline constexpr std::size_t kSourceCount = 9;
+using SourceSet = std::bitset<kSourceCount>;  ///< by Source
+
+[[nodiscard]] constexpr std::size_t index_of(Source source) { return static_cast<std::size_t>(source); }
+[[nodiscard]] constexpr Source beam_source(std::size_t beam) {
+  return static_cast<Source>(index_of(Source::beam_0) + beam);
+}
+
+inline constexpr std::array<const char*, kSourceCount> kSourceNames{"camera_left", "camera_right", "wheel_left",
+                                                                    "wheel_right", "beam_0",       "beam_1",
+                                                                    "beam_2",      "gyroscope",    "accelerometer"};
+
+/// What carries the estimate, besides the inertial sensors.
+enum class Aiding : std::uint8_t { none, standing, wheels, cameras, cameras_and_wheels };
+
+/// The last measurement of one source, against what was expected. Cameras: root mean square over the features tested
+/// [px]; wheels: speed over the ground [m/s]; beams: range [m]. The inertial sensors, which nothing predicts, count
+/// only.
+struct SourceRecord {
+  double innovation = 0.0;  ///< measured - predicted
+  double variance = 0.0;    ///< of the innovation, as expected
+  double gate_ratio = 0.0;  ///< squared Mahalanobis distance over its threshold: more than 1 does not fit
+  int used = 0;             ///< measurements that fitted since the frame before
+  int rejected = 0;         ///< measurements that did not
+  TimeNs last_used_ns = 0;  ///< when one fitted last (IMU time); 0: never
+};
+
+struct Health {
+  HealthStatus status = HealthStatus::initialising;
+  TimeNs since_ns = 0;                          ///< when the status began (IMU time)
+  SourceSet untrusted;                          ///< sources that the estimate should rest on, and does not
+  std::array<TimeNs, kSourceCount> onset_ns{};  ///< of these: since when
+  Aiding aiding = Aiding::none;                 ///< what is left
+  int quality = 0;                              ///< 0 (lost) ... 100
+  double horizontal_sigma = 0.0;   ///< [m] standard deviation of the position since the start, in the worst direction
+  double vertical_sigma = 0.0;     ///< [m]
+  std::uint8_t reset_counter = 0;  ///< grows when the pose goes on with a jump: after `lost`
+  std::array<SourceRecord, kSourceCount> sources{};
+};
+
+}  // namespace ear

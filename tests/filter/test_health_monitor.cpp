@@ -1,0 +1,230 @@
+// From records to trust, status and numbers that a flight controller acts on.
+#include <doctest/doctest.h>
+
+#include <limits>
+
+#include "filter/health_monitor.h"
+
+using namespace ear;
+
+namespace {
+
+TimeNs at(double t) { return static_cast<TimeNs>(1e9 * (100.0 + t)); }
+
+Calibration vehicle() {
+  Calibration calibration;
+  calibration.cameras.resize(2);
+  calibration.encoder.emplace();
+  calibration.lasers.emplace();
+  calibration.lasers->beams.resize(3);
+  return calibration;
+}
+
+using Records = std::array<SourceRecord, kSourceCount>;
+
+/// A sound vehicle that rolls, at 20 frames a second; what a test changes goes wrong.
+struct Drive {
+  HealthMonitor monitor{vehicle(), true, true};
+  HealthMonitor::Frame frame;
+  Records records{};
+  double t = 0.0;
+  double imu_t = 0.0;
+
+  Drive() {
+    frame.running = true;
+    frame.statistics.tracks = 100;
+    frame.statistics.stereo = 90;
+    frame.statistics.on_ground = true;
+    frame.statistics.wheel_rows_used = 15;
+    frame.agreement.matches = 90;
+    for (std::size_t i = 0; i < index_of(Source::gyroscope); ++i) records[i].used = 3;
+  }
+
+  void imu_until(double end) {
+    for (; imu_t <= end; imu_t += 0.01)
+      monitor.add_imu({at(imu_t), {0.0, 0.0, 1e-3 * imu_t}, {0.0, 0.0, 9.8 + 1e-3 * imu_t}}, false, 0.05);
+  }
+  void go_on(double duration) {
+    for (const double end = t + duration; t < end; t += 0.05) {
+      imu_until(t);
+      monitor.add_encoder({at(t), 0, 0}, at(t));
+      monitor.add_laser({at(t), {0.1 + 1e-3 * t, 0.2 + 1e-3 * t, 0.3 + 1e-3 * t}}, LaserCalibration{}, at(t));
+      frame.t_ns = at(t);
+      monitor.add_frame(frame, records, at(t));
+    }
+  }
+  void reject(Source source) {
+    records[index_of(source)].used = 0;
+    records[index_of(source)].rejected = 3;
+  }
+  [[nodiscard]] const Health& health() const { return monitor.health(); }
+};
+
+}  // namespace
+
+TEST_CASE("trust: it takes a while to lose it, and longer to win it back") {
+  Trust trust;
+  double t = 0.0;
+  for (; t < 0.2; t += 0.05) trust.add(true, at(t));
+  CHECK(trust.trusted());
+  for (; t < 0.4; t += 0.05) trust.add(true, at(t));
+  CHECK_FALSE(trust.trusted());
+  CHECK(trust.onset_ns() == at(0.0));
+  const double end = t;
+  for (; trust.trusted() == false; t += 0.05) trust.add(false, at(t));
+  CHECK(t - end > 0.4);
+  CHECK(t - end < 0.7);
+}
+
+TEST_CASE("health: a sound vehicle is tracked") {
+  Drive drive;
+  CHECK(drive.health().status == HealthStatus::initialising);
+  CHECK(drive.health().quality == 0);
+  drive.frame.horizontal_sigma = 0.1;
+  drive.go_on(2.0);
+  CHECK(drive.health().status == HealthStatus::tracking);
+  CHECK(drive.health().untrusted.none());
+  CHECK(drive.health().aiding == Aiding::cameras_and_wheels);
+  CHECK(drive.health().quality == 100);
+  CHECK(drive.health().horizontal_sigma == 0.1);
+  CHECK(drive.health().reset_counter == 0);
+}
+
+TEST_CASE("health: one source that is rejected degrades within half a second, and only while it lasts") {
+  for (std::size_t i = index_of(Source::wheel_left); i <= index_of(Source::beam_2); ++i) {
+    CAPTURE(i);
+    const auto source = static_cast<Source>(i);
+    Drive drive;
+    drive.go_on(1.0);
+    const Records sound = drive.records;
+    drive.reject(source);
+    drive.go_on(0.45);
+    CHECK(drive.health().status == HealthStatus::degraded);
+    CHECK(drive.health().untrusted.count() == 1);
+    CHECK(drive.health().untrusted[i]);
+    CHECK(drive.health().quality <= 60);
+    CHECK(drive.health().onset_ns[i] >= at(0.95));
+    drive.records = sound;
+    drive.go_on(1.0);
+    CHECK(drive.health().status == HealthStatus::tracking);
+  }
+}
+
+TEST_CASE("health: wheels that leave the ground are rightly silent") {
+  Drive drive;
+  drive.go_on(1.0);
+  drive.frame.statistics.on_ground = false;
+  drive.frame.statistics.wheel_rows_used = 0;
+  for (std::size_t i = index_of(Source::wheel_left); i <= index_of(Source::beam_2); ++i) drive.records[i].used = 0;
+  drive.go_on(3.0);
+  CHECK(drive.health().status == HealthStatus::tracking);
+  CHECK(drive.health().aiding == Aiding::cameras);
+}
+
+TEST_CASE(
+    "health: on wheels alone it is degraded, on inertia alone lost after two seconds; what comes then is a reset") {
+  Drive drive;
+  drive.go_on(1.0);
+  const HealthMonitor::Frame sound = drive.frame;
+  drive.frame.statistics.tracks = drive.frame.statistics.stereo = 0;
+  drive.frame.agreement = FrameAgreement{};
+  drive.go_on(10.0);
+  CHECK(drive.health().status == HealthStatus::degraded);
+  CHECK(drive.health().aiding == Aiding::wheels);
+  drive.frame.statistics.on_ground = false;
+  drive.go_on(1.9);
+  CHECK(drive.health().status == HealthStatus::degraded);
+  CHECK(drive.health().aiding == Aiding::none);
+  drive.go_on(0.3);
+  CHECK(drive.health().status == HealthStatus::lost);
+  CHECK(drive.health().quality == 0);
+  CHECK(drive.health().reset_counter == 0);
+  drive.frame = sound;
+  drive.go_on(1.0);
+  CHECK(drive.health().status == HealthStatus::tracking);
+  CHECK(drive.health().reset_counter == 1);
+}
+
+TEST_CASE("health: images that stop are noticed without a frame") {
+  Drive drive;
+  drive.go_on(1.0);
+  drive.imu_until(1.5);
+  CHECK(drive.health().status == HealthStatus::degraded);
+  CHECK(drive.health().untrusted[index_of(Source::camera_left)]);
+  drive.imu_until(4.0);
+  CHECK(drive.health().status == HealthStatus::lost);
+}
+
+TEST_CASE("health: a frozen image, a stuck beam, a gap, a clipped value, a jumping clock") {
+  const auto degraded_by = [](Drive& drive, Source source) {
+    return drive.health().status == HealthStatus::degraded && drive.health().untrusted[index_of(source)];
+  };
+  SUBCASE("frozen") {
+    Drive drive;
+    drive.go_on(1.0);
+    drive.frame.agreement.frozen = true;
+    drive.go_on(0.1);
+    CHECK(degraded_by(drive, Source::camera_left));
+  }
+  SUBCASE("stuck") {
+    Drive drive;
+    drive.go_on(1.0);
+    for (int i = 0; i < 20; ++i)
+      drive.monitor.add_laser({at(1.0 + 0.02 * i), {0.1, 0.2 + 1e-3 * i, 0.3 + 1e-3 * i}}, LaserCalibration{},
+                              at(1.0 + 0.02 * i));
+    drive.go_on(0.05);
+    CHECK(degraded_by(drive, Source::beam_0));
+    CHECK(drive.health().untrusted.count() == 1);
+  }
+  SUBCASE("gap") {
+    Drive drive;
+    drive.go_on(1.0);
+    drive.imu_t += 0.2;
+    drive.t += 0.2;
+    drive.go_on(0.1);
+    CHECK(degraded_by(drive, Source::gyroscope));
+  }
+  SUBCASE("clipped") {
+    Drive drive;
+    drive.go_on(1.0);
+    for (int i = 0; i < 2; ++i, drive.imu_t += 0.01) {
+      drive.monitor.add_imu({at(drive.imu_t), Eigen::Vector3d::Zero(), {39.2, 0.0, 9.8}}, false, 0.05);
+    }
+    drive.go_on(0.05);
+    CHECK(degraded_by(drive, Source::accelerometer));
+    CHECK_FALSE(drive.health().untrusted[index_of(Source::gyroscope)]);
+  }
+  SUBCASE("clock") {
+    Drive drive;
+    drive.go_on(2.0);
+    drive.monitor.add_encoder({at(2.1), 0, 0}, at(1.99));
+    drive.go_on(0.05);
+    CHECK(degraded_by(drive, Source::wheel_left));
+  }
+}
+
+TEST_CASE("health: images that contradict the state for a second, and no wheels: lost") {
+  Drive drive;
+  drive.frame.statistics.on_ground = false;
+  drive.go_on(1.0);
+  drive.frame.agreement.left = drive.frame.agreement.right = 0.95;
+  drive.go_on(0.8);
+  CHECK(drive.health().status == HealthStatus::degraded);
+  drive.go_on(0.5);
+  CHECK(drive.health().status == HealthStatus::lost);
+  CHECK(drive.monitor.contradicted());
+}
+
+TEST_CASE("health: what is not a number, or a velocity that may be anything, is lost") {
+  Drive drive;
+  drive.go_on(1.0);
+  drive.frame.finite = false;
+  drive.go_on(0.05);
+  CHECK(drive.health().status == HealthStatus::lost);
+  drive.frame.finite = true;
+  drive.go_on(0.1);
+  CHECK(drive.health().status == HealthStatus::tracking);
+  drive.frame.velocity_sigma = std::numeric_limits<double>::infinity();
+  drive.go_on(0.05);
+  CHECK(drive.health().status == HealthStatus::lost);
+}

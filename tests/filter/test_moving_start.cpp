@@ -1,0 +1,87 @@
+#include "filter/moving_start.h"
+
+#include <doctest/doctest.h>
+
+#include <cmath>
+
+#include "tools/simulator/simulation.h"
+
+using namespace ear;
+
+namespace {
+
+CameraState cameras_of(const Calibration& calibration) {
+  CameraState cameras;
+  const Eigen::Isometry3d& T_BC0 = calibration.cameras[0].T_BC;
+  const Eigen::Isometry3d T_C0C1 = T_BC0.inverse() * calibration.cameras[1].T_BC;
+  cameras.T_BC0 = {T_BC0.linear(), T_BC0.translation()};
+  cameras.T_C0C1 = {T_C0C1.linear(), T_C0C1.translation()};
+  return cameras;
+}
+
+simulator::Simulation fly(double camera_rate_hz, std::uint64_t seed) {
+  simulator::Options options;
+  options.sequence = "fly1";
+  options.seed = seed;
+  options.duration = 30.0;
+  options.camera_rate_hz = camera_rate_hz;
+  return simulator::Simulation(options);
+}
+
+/// The frames of two seconds from `from` seconds on; `change` may alter them.
+template <typename Change>
+std::optional<ImuState> start(const simulator::Simulation& simulation, double from, const Change& change) {
+  ImuBuffer imu(4096);
+  const TimeNs begin_ns = simulation.imu().front().t_ns + static_cast<TimeNs>(1e9 * from);
+  const TimeNs end_ns = begin_ns + 2'000'000'000;
+  for (const ImuSample& sample : simulation.imu()) {
+    if (sample.t_ns >= begin_ns - 20'000'000 && sample.t_ns <= end_ns + 20'000'000) imu.push(sample);
+  }
+  MovingStart moving({0.1, 0.05, 0.6 / 385.0});
+  const CameraState cameras = cameras_of(simulation.calibration());
+  for (std::size_t i = 0; i < simulation.frame_times().size(); ++i) {
+    const TimeNs t_ns = simulation.frame_times()[i];
+    if (t_ns < begin_ns || t_ns > end_ns) continue;
+    FeatureFrame frame = simulation.tracks(i);
+    change(frame);
+    moving.add(t_ns, frame, imu, cameras);
+    if (auto state = moving.solve(imu)) return state;
+  }
+  return std::nullopt;
+}
+
+const auto kUnchanged = [](FeatureFrame&) {};
+
+}  // namespace
+
+TEST_CASE("moving start: tilt and velocity in flight and on the ground, at any frame rate") {
+  for (const double rate : {30.0, 10.0, 5.0}) {
+    CAPTURE(rate);
+    const simulator::Simulation simulation = fly(rate, 831);
+    for (const double from : {4.0, 10.0, 14.0, 18.0}) {
+      CAPTURE(from);
+      const auto state = start(simulation, from, kUnchanged);
+      REQUIRE(state);
+      const simulator::Truth truth = simulation.truth(state->t_ns);
+      const Eigen::Vector3d up_B = state->R_WB.transpose() * Eigen::Vector3d::UnitZ();
+      CHECK(std::acos(std::min(1.0, up_B.dot(truth.R_WB.transpose() * Eigen::Vector3d::UnitZ()))) < 0.1);
+      CHECK((state->R_WB.transpose() * state->v_W - truth.R_WB.transpose() * truth.v_W).norm() < 0.3);
+      CHECK((state->b_g - truth.b_g).norm() < 0.02);  // the camera is mounted otherwise than told
+    }
+  }
+}
+
+TEST_CASE("moving start: not with one camera, nor with swapped ones, nor with a frozen image") {
+  const simulator::Simulation simulation = fly(30.0, 832);
+  CHECK_FALSE(start(simulation, 12.0, [](FeatureFrame& frame) {
+    for (FeatureObservation& o : frame.features) o.has_right = false;
+  }));
+  CHECK_FALSE(start(simulation, 12.0, [](FeatureFrame& frame) {
+    for (FeatureObservation& o : frame.features) std::swap(o.left, o.right);
+  }));
+  FeatureFrame first;
+  CHECK_FALSE(start(simulation, 12.0, [&](FeatureFrame& frame) {
+    if (first.features.empty()) first = frame;
+    frame.features = first.features;
+  }));
+}

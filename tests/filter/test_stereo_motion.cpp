@@ -1,0 +1,151 @@
+// Motion between two frames from stereo features, and whether frames agree with a motion.
+#include <doctest/doctest.h>
+
+#include <random>
+
+#include "filter/frame_check.h"
+#include "filter/so3.h"
+#include "filter/stereo_motion.h"
+
+using namespace ear;
+
+namespace {
+
+constexpr double kSigma = 0.5 / 385.0;
+constexpr double kGate = 11.6;  // chi-square, 2 degrees of freedom, 0.997
+
+CameraState cameras() {
+  CameraState c;
+  c.T_BC0.R << 0, 0, 1, -1, 0, 0, 0, -1, 0;  // z forward
+  c.T_BC0.p = {0.1, 0.05, 0.02};
+  c.T_C0C1.R = exp_so3({0.002, -0.001, 0.003});
+  c.T_C0C1.p = {0.1, 0.001, -0.002};
+  return c;
+}
+
+struct Pair {
+  FeatureFrame from, to;
+};
+
+/// Points 1.5 to 8 m ahead, seen before and after a motion; `sigma`: noise of every observation.
+Pair look(const Eigen::Matrix3d& R_B0B1, const Eigen::Vector3d& p_B0B1, double sigma, unsigned seed) {
+  std::mt19937_64 rng{seed};
+  std::uniform_real_distribution<double> side(-0.5, 0.5), depth(1.5, 8.0);
+  std::normal_distribution<double> noise(0.0, sigma);
+  const CameraState c = cameras();
+  Pair pair;
+  for (std::uint64_t id = 1; id <= 100; ++id) {
+    const double z = depth(rng);
+    const Eigen::Vector3d p_C0(side(rng) * z, side(rng) * z, z);
+    const Eigen::Vector3d p_B0 = c.T_BC0.R * p_C0 + c.T_BC0.p;
+    const auto see = [&](const Eigen::Vector3d& p_B) {
+      const Eigen::Vector3d left = c.T_BC0.R.transpose() * (p_B - c.T_BC0.p);
+      const Eigen::Vector3d right = c.T_C0C1.R.transpose() * (left - c.T_C0C1.p);
+      const auto noisy = [&](const Eigen::Vector3d& p) {
+        const double du = sigma > 0.0 ? noise(rng) : 0.0;
+        const double dv = sigma > 0.0 ? noise(rng) : 0.0;
+        return Eigen::Vector2d(p.hnormalized() + Eigen::Vector2d(du, dv));
+      };
+      FeatureObservation o;
+      o.id = id;
+      o.left = noisy(left);
+      o.right = noisy(right);
+      o.has_right = true;
+      return o;
+    };
+    pair.from.features.push_back(see(p_B0));
+    pair.to.features.push_back(see(R_B0B1.transpose() * (p_B0 - p_B0B1)));
+  }
+  return pair;
+}
+
+std::vector<StereoMatch> matched(const Pair& pair) {
+  std::vector<StereoMatch> matches;
+  match_stereo(pair.from, pair.to, matches);
+  return matches;
+}
+
+const Eigen::Vector3d kTurn(0.02, -0.01, 0.05);
+const Eigen::Vector3d kWay(0.15, -0.02, 0.03);
+
+}  // namespace
+
+TEST_CASE("stereo motion: without noise it is exact, from a start that knows nothing") {
+  const Pair pair = look(exp_so3(kTurn), kWay, 0.0, 1);
+  const auto motion = stereo_motion(matched(pair), cameras(), StereoMotion{}, kSigma);
+  REQUIRE(motion);
+  CHECK((motion->p_B0B1 - kWay).norm() < 1e-9);
+  CHECK(log_so3(motion->R_B0B1.transpose() * exp_so3(kTurn)).norm() < 1e-9);
+  CHECK(motion->fitting == 100);
+}
+
+TEST_CASE("stereo motion: with noise the error is about what the covariance says") {
+  double sum = 0.0;
+  for (unsigned seed = 0; seed < 100; ++seed) {
+    const Pair pair = look(exp_so3(kTurn), 0.2 * kWay, kSigma, seed);
+    const auto motion = stereo_motion(matched(pair), cameras(), StereoMotion{}, kSigma);
+    REQUIRE(motion);
+    const Eigen::Vector3d e = motion->p_B0B1 - 0.2 * kWay;
+    sum += e.dot(motion->covariance.ldlt().solve(e)) / 100.0;
+  }
+  CHECK(sum > 1.5);
+  CHECK(sum < 7.0);  // 3, and what the depths share that the sums take as independent
+}
+
+TEST_CASE("stereo motion: a third of the features on something that moves does not lead it astray") {
+  Pair pair = look(exp_so3(kTurn), kWay, kSigma, 3);
+  for (std::size_t i = 0; i < 30; ++i) {
+    pair.to.features[i].left.x() += 0.05;
+    pair.to.features[i].right.x() += 0.05;
+  }
+  const auto motion = stereo_motion(matched(pair), cameras(), StereoMotion{}, kSigma);
+  REQUIRE(motion);
+  CHECK((motion->p_B0B1 - kWay).norm() < 0.03);
+}
+
+TEST_CASE("stereo motion: images the wrong way round tell nothing") {
+  Pair pair = look(exp_so3(kTurn), kWay, kSigma, 4);
+  for (FeatureFrame* frame : {&pair.from, &pair.to}) {
+    for (FeatureObservation& o : frame->features) std::swap(o.left, o.right);
+  }
+  CHECK_FALSE(stereo_motion(matched(pair), cameras(), StereoMotion{}, kSigma));
+}
+
+TEST_CASE("frame check: the right motion fits, a wrong one does not") {
+  const Pair pair = look(exp_so3(kTurn), kWay, kSigma, 5);
+  FrameCheck check(kSigma, kGate);
+  const FrameAgreement right = check.compare(pair.from, pair.to, {exp_so3(kTurn), kWay, 0.0}, cameras());
+  CHECK(right.matches == 100);
+  CHECK(right.left < 0.05);
+  CHECK(right.right < 0.05);
+  CHECK(right.behind == 0.0);
+  CHECK_FALSE(right.frozen);
+  CHECK(right.turn.norm() < 5.0 * right.turn_sigma);
+  const FrameAgreement wrong =
+      check.compare(pair.from, pair.to, {Eigen::Matrix3d::Identity(), Eigen::Vector3d::Zero(), 0.0}, cameras());
+  CHECK(wrong.left > 0.9);
+}
+
+TEST_CASE("frame check: what turns a little more than predicted shows in the turn, not in the share") {
+  const Eigen::Vector3d more(0.0005, -0.0003, 0.0007);
+  FrameCheck check(kSigma, kGate);
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (unsigned seed = 0; seed < 50; ++seed) {
+    const Pair pair = look(exp_so3(kTurn) * exp_so3(more), 0.2 * kWay, kSigma, seed);
+    const FrameAgreement a = check.compare(pair.from, pair.to, {exp_so3(kTurn), 0.2 * kWay, 0.0}, cameras());
+    CHECK(a.left < 0.1);
+    mean += a.turn / 50.0;
+  }
+  CHECK((mean - more).norm() < 2e-4);
+}
+
+TEST_CASE("frame check: frozen and swapped images are seen at once") {
+  Pair pair = look(Eigen::Matrix3d::Identity(), Eigen::Vector3d::Zero(), kSigma, 6);
+  FrameCheck check(kSigma, kGate);
+  CHECK_FALSE(check.compare(pair.from, pair.to, {}, cameras()).frozen);
+  CHECK(check.compare(pair.from, pair.from, {}, cameras()).frozen);
+  for (FeatureFrame* frame : {&pair.from, &pair.to}) {
+    for (FeatureObservation& o : frame->features) std::swap(o.left, o.right);
+  }
+  CHECK(check.compare(pair.from, pair.to, {}, cameras()).behind > 0.9);
+}
