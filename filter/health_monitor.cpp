@@ -9,7 +9,7 @@ namespace {
 constexpr double kLongest = 0.25;    // [s] that one piece of evidence may count
 constexpr double kMajority = 0.5;    // of the measurements of a wheel or beam
 constexpr double kManyOff = 0.3;     // of the features off their place: a camera is in doubt
-constexpr double kMostOff = 0.7;     // and contradicts the state
+constexpr double kMostOff = 0.5;     // and contradicts the state
 constexpr double kFewStereo = 0.25;  // of the features: less are seen by the right camera
 constexpr int kFewTracks = 10;
 constexpr double kSilent = 0.12;  // [s] without a frame, and kMissedFrames of its intervals
