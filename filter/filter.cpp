@@ -442,6 +442,7 @@ void Filter::start_again(const FeatureFrame& frame) {
 void Filter::stop() {
   status_ = Status::lost;
   state_.imu = ImuState{};
+  impact_guard_ = ImpactGuard(config_.impact, calibration_.imu);  // the next start may lie before its last sample
   state_.clones.clear();
   state_.camera = camera_state(calibration_);
   state_.odometer = odometer_state(calibration_);
