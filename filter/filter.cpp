@@ -35,6 +35,7 @@ constexpr double kGapNoiseFactor = 10.0;       // on the noise densities while a
 constexpr double kStartGravityNoise = 0.02;    // [m/s^2] what idling rotors leave in the mean specific force
 constexpr double kKnownSigma = 1e-6;           // [m, rad] of position and yaw at the start: by definition zero
 constexpr double kUnknownTilt = 0.3;           // [rad] before gravity was measured
+constexpr double kLeastStartSpeed = 0.2;       // [m/s] slower is as good as standing
 constexpr double kUnseenSpeed = 1.0;           // [m/s] that the vehicle may have gained since it was lost
 constexpr double kOldImage = 0.5;              // [s] after which frames have little in common
 constexpr double kLifting = 0.3;               // [s] after wheels that leave the ground, or meet it, as it seems
@@ -561,6 +562,8 @@ bool Filter::try_moving_start(const FeatureFrame& frame) {
 bool Filter::begin_moving() {
   const std::optional<ImuState> start = moving_start_.solve(imu_);
   if (!start) return false;
+  // A first start can wait for the vehicle to stand, which tells gravity and biases better, or to move.
+  if (status_ != Status::lost && start->v_W.norm() < kLeastStartSpeed) return false;
   state_.imu = *start;
   Eigen::VectorXd sigma = start_sigma();
   sigma.segment<3>(err::nu).setConstant(kRollingVelocity * (1.0 + start->v_W.norm()));

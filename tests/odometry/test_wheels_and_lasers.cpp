@@ -29,6 +29,7 @@ struct Errors {
   double inside = 0.0;    ///< share of the slopes within three standard deviations
   double mode = 0.0;      ///< share of the estimates that know whether the vehicle is on the ground
   double start = 0.0;     ///< first estimate, since the first frame [s]
+  double last = 0.0;      ///< last estimate [s]
   double gap = 0.0;       ///< longest between two estimates [s]
 };
 
@@ -43,6 +44,7 @@ Errors run(const simulator::Simulation& simulation, OdometerModel model,
   const auto estimates = test::run_filter(filter, simulation, change);
   REQUIRE(!estimates.empty());
   errors.start = estimates.front().t;
+  errors.last = estimates.back().t;
   for (std::size_t i = 1; i < estimates.size(); ++i) {
     errors.gap = std::max(errors.gap, estimates[i].t - estimates[i - 1].t);
   }
@@ -99,7 +101,8 @@ TEST_CASE("wheels and lasers: with the lens covered they carry on") {
     if (frame.t_ns > covered_ns) frame.features.clear();
   };
   CHECK(run(simulation, OdometerModel::terrain, cover).position < 0.2);
-  CHECK(run(simulation, OdometerModel::none, cover).position > 1.0);
+  // By inertia alone the position would be lost within seconds: nothing is said.
+  CHECK(run(simulation, OdometerModel::none, cover).last < 12.0);
 }
 
 TEST_CASE("wheels and lasers: with the lens covered from the beginning they start, and find the way") {

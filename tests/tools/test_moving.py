@@ -16,14 +16,15 @@ CLIPS = Path(sys.argv.pop(1)).resolve()
 
 FIRST_POSE = 2.5  # [s] after the first image at the latest
 
-# The INS tells the speed of the IMU; wheels that roll so stand right and left of it.
+# The INS tells the speed of the IMU, and so does a wheel beneath it, given as two side by side: wheels further apart
+# would have to turn differently in curves.
 ENCODER_YAML = """sensor_type: wheel_encoder
 rate_hz: 50
 T_BS: {rows: 4, cols: 4, data: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]}
 resolution: 262144
 wraps: false
 wheel_radius: [0.3, 0.3]
-wheel_separation: 1.5
+wheel_separation: 0.02
 noise_counts: 20.0
 """
 COUNTS_PER_METRE = 262144 / (2.0 * 3.141592653589793 * 0.3)
