@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "filter/known_gravity.h"
 #include "filter/so3.h"
 
 namespace ear {
@@ -16,10 +17,8 @@ constexpr double kScaleSigma = 0.02;     // of a way: noise of the disparities m
 constexpr double kWaySigma = 1e-3;       // [m]
 constexpr double kAccelSigma = 0.3;      // [m/s^2] what a poor accelerometer may be off between two frames
 constexpr double kRotationSigma = 2e-3;  // [rad] of a rotation from the cameras
-constexpr double kGravitySigma = 0.01;   // [m/s^2] of its known size
 constexpr double kWorstGravity = 0.7;    // [m/s^2] by which the cameras alone may miss it
 constexpr double kWorstFit = 2.5;        // root mean square residual, in standard deviations
-constexpr int kIterations = 3;
 
 // Unknowns: velocity and gravity in the first body frame, bias of the accelerometer.
 constexpr int kV = 0, kG = 3, kBa = 6, kUnknowns = 9;
@@ -140,19 +139,11 @@ std::optional<ImuState> MovingStart::solve(const ImuBuffer& imu) const {
     cost += z.squaredNorm() / variance;
   }
 
-  // Gravity as the cameras see it must have about its known size; that then is a row along its direction, again as the
-  // direction gets better.
-  Vector x = A.ldlt().solve(b);
-  const double miss = std::abs(x.segment<3>(kG).norm() + kGravity_W.z());
+  // Gravity as the cameras alone see it must have about its known size.
+  const Vector unbound = A.ldlt().solve(b);
+  const double miss = std::abs(unbound.segment<3>(kG).norm() + kGravity_W.z());
   if (!(miss < kWorstGravity)) return std::nullopt;
-  for (int i = 0; i < kIterations; ++i) {
-    const Eigen::Vector3d along = x.segment<3>(kG).normalized() / kGravitySigma;
-    Matrix with_gravity = A;
-    with_gravity.block<3, 3>(kG, kG) += along * along.transpose();
-    Vector rhs = b;
-    rhs.segment<3>(kG) += along * (-kGravity_W.z() / kGravitySigma);
-    x = with_gravity.ldlt().solve(rhs);
-  }
+  const Vector x = solve_with_known_gravity(A, b, kG);
   const double fit = x.dot(A * x) - 2.0 * b.dot(x) + cost;
   const auto rows = 3.0 * static_cast<double>(frames_.size() - 1);
   if (!(fit <= kWorstFit * kWorstFit * rows)) return std::nullopt;

@@ -1,7 +1,8 @@
 #include "filter/rolling_start.h"
 
-#include <Eigen/Cholesky>
 #include <cmath>
+
+#include "filter/known_gravity.h"
 
 namespace ear {
 namespace {
@@ -9,9 +10,7 @@ namespace {
 constexpr double kLongestTurn = 0.1;      // [s] between two readings
 constexpr double kSpeedSigma = 0.02;      // [m/s]
 constexpr double kDirectionSigma = 0.05;  // [rad] of the velocity in the body: it pitches about the axle
-constexpr double kGravitySigma = 0.01;    // [m/s^2] of its known size
 constexpr double kWorstFit = 2.0;         // root mean square residual, in standard deviations
-constexpr int kIterations = 3;
 
 // Unknowns: velocity and gravity in the first body frame, biases.
 constexpr int kV = 0, kG = 3, kBg = 6, kBa = 9, kUnknowns = 12;
@@ -78,16 +77,7 @@ std::optional<ImuState> rolling_start(const ImuBuffer& imu, const Ring<WheelTurn
   }
   if (seconds_between(start_ns, turns.back().to_ns) < min_duration) return std::nullopt;
 
-  // The size of gravity is known: a row along the present direction, again as the direction gets better.
-  Vector x = A.ldlt().solve(b);
-  for (int i = 0; i < kIterations; ++i) {
-    const Eigen::Vector3d along = x.segment<3>(kG).normalized() / kGravitySigma;
-    Matrix with_gravity = A;
-    with_gravity.block<3, 3>(kG, kG) += along * along.transpose();
-    Vector rhs = b;
-    rhs.segment<3>(kG) += along * (-kGravity_W.z() / kGravitySigma);
-    x = with_gravity.ldlt().solve(rhs);
-  }
+  const Vector x = solve_with_known_gravity(A, b, kG);
   const double fit = x.dot(A * x) - 2.0 * b.dot(x) + cost;
   if (!(fit <= 3.0 * kWorstFit * kWorstFit * static_cast<double>(turns.size()))) return std::nullopt;
 

@@ -35,15 +35,13 @@ Eigen::Vector2d project(const State& x, int clone, int camera, const Eigen::Vect
   return {f_C.x() / f_C.z(), f_C.y() / f_C.z()};
 }
 
-Scene random_scene(std::mt19937_64& rng, int clones, double outlier = 0.0) {
-  Scene scene;
-  scene.x = random_state(rng, clones);
+/// Both cameras of the clones from `first` on see the point, with noise; `outlier` is added to one x, that of camera 0
+/// of the clone after the very first.
+void see(std::mt19937_64& rng, const Eigen::Vector3d& f_W, int first, double outlier, Scene& scene) {
   std::vector<CameraPose> cameras;
   camera_poses(scene.x, cameras);
-  const Eigen::Vector3d ahead = scene.x.camera.T_BC0.p + scene.x.camera.T_BC0.R * Eigen::Vector3d(0.3, -0.2, 4.0);
-  const Eigen::Vector3d f_W = scene.x.imu.R_WB * ahead + scene.x.imu.p_WB;
   std::vector<std::pair<int, int>> who;
-  for (int i = 0; i < clones; ++i) {
+  for (int i = first; i < static_cast<int>(scene.x.clones.size()); ++i) {
     for (int camera = 0; camera < 2; ++camera) {
       Eigen::Vector2d uv = project(scene.x, i, camera, f_W) + kSigma * random_vector(rng, 1.0).head<2>();
       if (i == 1 && camera == 0) uv.x() += outlier;
@@ -59,6 +57,13 @@ Scene random_scene(std::mt19937_64& rng, int clones, double outlier = 0.0) {
     scene.observations.push_back(
         linearize_observation(scene.x, who[k].first, who[k].second, scene.point, scene.sightings[k].uv));
   }
+}
+
+Scene random_scene(std::mt19937_64& rng, int clones, double outlier = 0.0) {
+  Scene scene;
+  scene.x = random_state(rng, clones);
+  const Eigen::Vector3d ahead = scene.x.camera.T_BC0.p + scene.x.camera.T_BC0.R * Eigen::Vector3d(0.3, -0.2, 4.0);
+  see(rng, scene.x.imu.R_WB * ahead + scene.x.imu.p_WB, 0, outlier, scene);
   return scene;
 }
 
@@ -82,22 +87,7 @@ Scene slow_scene(std::mt19937_64& rng, int clones) {
   const Eigen::Vector3d f_W =
       last.p_WC + depth * (last.R_CW.transpose() * Eigen::Vector3d(unit(rng) - 0.5, unit(rng) - 0.5, 1.0));
   const int first = static_cast<int>(unit(rng) * (clones - 1));
-  std::vector<std::pair<int, int>> who;
-  for (int i = first; i < clones; ++i) {
-    for (int camera = 0; camera < 2; ++camera) {
-      const Eigen::Vector2d uv = project(scene.x, i, camera, f_W) + kSigma * random_vector(rng, 1.0).head<2>();
-      const CameraPose& pose = cameras[static_cast<std::size_t>(2 * i + camera)];
-      scene.sightings.push_back({pose.R_CW, pose.p_WC, uv});
-      who.emplace_back(i, camera);
-    }
-  }
-  const auto point = triangulate(scene.sightings);
-  REQUIRE(point);
-  scene.point = *point;
-  for (std::size_t k = 0; k < who.size(); ++k) {
-    scene.observations.push_back(
-        linearize_observation(scene.x, who[k].first, who[k].second, scene.point, scene.sightings[k].uv));
-  }
+  see(rng, f_W, first, 0.0, scene);
   return scene;
 }
 

@@ -12,8 +12,7 @@
 
 #include "filter/filter.h"
 #include "src/health_text.h"
-#include "tools/blind_steps.h"
-#include "tools/experiments/sample_feed.h"
+#include "tools/experiments/replay_simulation.h"
 #include "tools/simulator/faults.h"
 #include "tools/simulator/sequence.h"
 #include "tools/simulator/simulation.h"
@@ -50,21 +49,16 @@ struct Log {
   }
 };
 
-Log replay(const simulator::Simulation& simulation) {
+Log listen(const simulator::Simulation& simulation) {
   Filter filter(FilterConfig{}, simulation.calibration());
   const TimeNs start_ns = simulation.truth_times().front();
-  tools::BlindSteps steps(true, true);
   Log log;
-  for (const simulator::Delivery& delivery : simulation.deliveries()) {
-    hand_over(simulation, delivery, filter);
-    if (delivery.stream == simulator::SensorStream::camera) {
-      steps.saw_frame(delivery.arrival_ns);
-      (void)filter.process(simulation.tracks(delivery.index));
-    } else if (delivery.stream == simulator::SensorStream::imu && steps.due(delivery.arrival_ns)) {
-      (void)filter.process_without_image(filter.camera_time(simulation.imu()[delivery.index].t_ns));
-    }
+  ReplayOptions options;
+  options.after = [&](const simulator::Delivery& delivery) {
     log.add(seconds_between(start_ns, delivery.arrival_ns), filter.health());
-  }
+  };
+  replay(
+      simulation, filter, [](TimeNs, const Estimate&) {}, options);
   return log;
 }
 
@@ -116,7 +110,7 @@ void run(const Arguments& args) {
         options.seed = seed;
         options.camera_rate_hz = args.camera_rate_hz;
         if (!text.empty()) options.faults.push_back(simulator::parse_fault(text));
-        const Log log = replay(simulator::Simulation(options));
+        const Log log = listen(simulator::Simulation(options));
         const std::string name = sequence + " " + std::to_string(seed);
         if (args.verbose) {
           for (const Change& change : log.changes) std::printf("  %8.3f %s\n", change.t, change.text.c_str());

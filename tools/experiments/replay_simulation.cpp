@@ -24,6 +24,7 @@ void replay(const simulator::Simulation& simulation, Filter& filter, const OnEst
       const TimeNs stamp_ns = filter.camera_time(simulation.imu()[delivery.index].t_ns);
       estimate(stamp_ns, filter.process_without_image(stamp_ns));
     }
+    if (options.after) options.after(delivery);
   }
 }
 

@@ -14,8 +14,12 @@ using ChangeFrame = std::function<void(FeatureFrame&)>;
 /// Is given every estimate, and the time that it was asked for: a frame's stamp, or the stamp that a frame would have.
 using OnEstimate = std::function<void(TimeNs stamp_ns, const Estimate& estimate)>;
 
+/// Is called after each sample or frame was handed over.
+using OnDelivery = std::function<void(const simulator::Delivery& delivery)>;
+
 struct ReplayOptions {
   ChangeFrame change = {};
+  OnDelivery after = {};
   bool camera = true;  ///< false: no frame is handed over
   bool wheels = true;  ///< false: no steps while frames are missing (tools/blind_steps.h)
 };
