@@ -28,7 +28,8 @@ constexpr TimeNs kMissedReading = 50'000'000;  // [ns] without wheel readings: a
 constexpr double kAccelSpike = 25.0;           // [m/s^2] of one sample from the mean of its neighbours
 constexpr double kGyroSpike = 2.0;             // [rad/s] the same
 constexpr double kSpikeRatio = 4.0;            // and so many times the difference of these
-constexpr double kTooLate = 0.1;               // [s] behind the state: a reading that comes so late is not used
+constexpr double kLongestPredict = 0.5;        // [s] beyond the newest sample
+constexpr double kGravityTolerance = 1.5;      // [m/s^2] of the specific force at rest: more is a wrong unit
 constexpr double kWheelAge = 0.1;              // [s] older readings do not tell whether the wheels rest
 constexpr double kHeldSample = 0.04;           // [s] so far the newest IMU sample may stand in for one that is missing
 constexpr double kGapNoiseFactor = 10.0;       // on the noise densities while a gap in the IMU data is bridged
@@ -132,6 +133,7 @@ Filter::Filter(const FilterConfig& config, const Calibration& calibration)
       gate_(config.gate_probability, 4 * (config.window + 1)),
       covariance_(error_capacity(config)),
       imu_(kImuCapacity),
+      guard_(calibration, config.max_imu_gap),
       impact_guard_(config.impact, calibration.imu),
       turns_(kWheelCapacity),
       ranges_(kWheelCapacity),
@@ -162,18 +164,17 @@ TimeNs Filter::camera_time(TimeNs imu_time_ns) const {
 bool Filter::is_next(TimeNs t_ns) const { return !any_frame_ || t_ns > last_frame_ns_; }
 
 bool Filter::covers(TimeNs t_ns) const {
-  return !imu_.empty() && seconds_between(imu_.newest().t_ns, imu_time(t_ns)) < kHeldSample;
+  return is_time(t_ns) && !imu_.empty() && seconds_between(imu_.newest().t_ns, imu_time(t_ns)) < kHeldSample;
 }
 
 void Filter::add_imu(const ImuSample& sample) {
-  const bool finite = sample.gyro_B.allFinite() && sample.accel_B.allFinite();
-  if (!finite || (!imu_.empty() && sample.t_ns <= imu_.newest().t_ns)) {
-    ++counts_.imu_rejected;
-    monitor_.add_imu(sample, true, config_.max_imu_gap);
+  const ImuVerdict verdict = guard_.judge(sample);
+  if (!verdict.accepted) {
+    monitor_.add_refused_imu();
     return;
   }
-  monitor_.add_imu(sample, false, config_.max_imu_gap);
-  if (!imu_.empty() && seconds_between(imu_.newest().t_ns, sample.t_ns) > config_.max_imu_gap) ++counts_.imu_gaps;
+  if (verdict.begins_anew) restart(sample.t_ns, verdict.clock_shift);
+  monitor_.add_imu(sample, config_.max_imu_gap);
   // Without frames for long, the state moves on before its samples are overwritten.
   if (status_ == Status::tracking && imu_.size() == kImuCapacity && state_.imu.t_ns < imu_[kImuCapacity / 2].t_ns) {
     advance(imu_[kImuCapacity / 2].t_ns);
@@ -181,6 +182,19 @@ void Filter::add_imu(const ImuSample& sample) {
   mend_spike(sample);
   imu_.push(sample);
   if (encoder_) note_contact(contact_.add_imu(sample));
+}
+
+/// As after construction, but for the inertial clock, and where the vehicle was last known to be.
+void Filter::restart(TimeNs t_ns, TimeNs clock_shift) {
+  Filter fresh(config_, calibration_);
+  fresh.guard_ = std::move(guard_);
+  fresh.guard_.restart();
+  fresh.monitor_.succeed(monitor_, t_ns);
+  fresh.anchor_ = anchor_;
+  fresh.last_good_ = std::move(last_good_);
+  if (fresh.last_good_) fresh.last_good_->state.t_ns += clock_shift;
+  if (status_ == Status::tracking || status_ == Status::lost) fresh.status_ = Status::lost;
+  *this = std::move(fresh);
 }
 
 /// One sample that is far from both its neighbours, which agree with each other, is a fault of the sensor or its bus:
@@ -199,7 +213,7 @@ void Filter::mend_spike(const ImuSample& next) {
   if (!gyro && !accel) return;
   monitor_.add_spike(gyro, accel, next.t_ns);
   imu_.correct_newest(0.5 * (before.gyro_B + next.gyro_B), 0.5 * (before.accel_B + next.accel_B));
-  ++counts_.imu_spikes;
+  guard_.count_spike();
 }
 
 /// After a change of the ground under the wheels nothing is known of it. A take-off is noticed some centimetres above
@@ -218,22 +232,20 @@ bool Filter::rolls_at(TimeNs t_ns) const {
   return on_ground() && (!since_ns || seconds_between(*since_ns, t_ns) > kSpinUp);
 }
 
+std::optional<TimeNs> Filter::state_time() const {
+  return status_ == Status::tracking ? std::optional(state_.imu.t_ns) : std::nullopt;
+}
+
 void Filter::add_encoder(const EncoderSample& sample) {
   if (!encoder_) return;
-  if (encoder_->any() && sample.t_ns <= encoder_->last_ns()) {
-    ++counts_.encoder_rejected;
-    return;
-  }
-  if (!imu_.empty()) monitor_.add_encoder(sample, imu_.newest().t_ns);
+  const Verdict verdict = guard_.judge(sample, state_time(), *encoder_);
+  if (!imu_.empty()) monitor_.add_encoder(sample, verdict, imu_.newest().t_ns);
+  if (verdict != Verdict::accepted) return;
   note_contact(contact_.add_encoder(sample));
   const std::optional<WheelTurn> turn = encoder_->add(sample);
   if (!turn) return;
   wheel_rest_.add(*turn);
   if (status_ == Status::tracking) {
-    if (seconds_between(turn->to_ns, state_.imu.t_ns) > kTooLate) {
-      ++counts_.encoder_rejected;
-      return;
-    }
     if (turns_.full()) advance_measuring(turns_.front().to_ns);  // no frames for long
   } else {
     const auto too_old = [&] { return seconds_between(turns_.front().from_ns, turn->to_ns) > kRollingWindow; };
@@ -244,13 +256,9 @@ void Filter::add_encoder(const EncoderSample& sample) {
 
 void Filter::add_laser(const LaserSample& sample) {
   if (!encoder_ || beam_count_ == 0) return;
-  const bool usable = sample.t_ns > last_range_ns_ && static_cast<int>(sample.range.size()) == beam_count_;
-  if (!usable || (status_ == Status::tracking && seconds_between(sample.t_ns, state_.imu.t_ns) > kTooLate)) {
-    ++counts_.laser_rejected;
-    return;
-  }
-  last_range_ns_ = sample.t_ns;
-  if (!imu_.empty()) monitor_.add_laser(sample, *calibration_.lasers, imu_.newest().t_ns);
+  const Verdict verdict = guard_.judge(sample, state_time());
+  if (!imu_.empty()) monitor_.add_laser(sample, verdict, *calibration_.lasers, imu_.newest().t_ns);
+  if (verdict != Verdict::accepted) return;
   note_contact(contact_.add_laser(sample));
   if (status_ == Status::tracking) {
     if (ranges_.full()) advance_measuring(ranges_.front().t_ns);
@@ -265,7 +273,7 @@ void Filter::add_laser(const LaserSample& sample) {
 }
 
 std::optional<RelativeMotion> Filter::motion_to(TimeNs t_ns) const {
-  if (!any_image_ || imu_.empty() || t_ns <= last_image_ns_) return std::nullopt;
+  if (!is_time(t_ns) || !any_image_ || imu_.empty() || t_ns <= last_image_ns_) return std::nullopt;
   RelativeMotion motion;
   if (status_ != Status::tracking) {
     if (const std::optional<Eigen::Vector3d> way = moving_start_.way_to(imu_time(t_ns))) {
@@ -286,12 +294,13 @@ std::optional<RelativeMotion> Filter::motion_to(TimeNs t_ns) const {
   return motion;
 }
 
-std::optional<Estimate> Filter::process(const FeatureFrame& frame) {
-  if (!is_next(frame.t_ns)) return std::nullopt;
-  if (!covers(frame.t_ns)) {
-    refuse_frame(frame.t_ns);
+std::optional<Estimate> Filter::process(const FeatureFrame& given) {
+  if (!is_next(given.t_ns)) return std::nullopt;
+  if (!covers(given.t_ns)) {
+    refuse_frame();
     return std::nullopt;
   }
+  const FeatureFrame& frame = guard_.sound(given);
   const bool still = begin_frame(frame);
   FrameAgreement agreement;
   if (status_ == Status::tracking) {
@@ -346,24 +355,37 @@ std::optional<Estimate> Filter::finish_frame(bool image, const FrameAgreement& a
   std::optional<Estimate> estimate;
   if (frame.running) {
     estimate = make_estimate();
-    const NavState& x = estimate->state;
-    frame.finite = x.q_WB.coeffs().allFinite() && x.p_WB.allFinite() && x.v_W.allFinite() && x.b_g.allFinite() &&
-                   x.b_a.allFinite() && estimate->covariance.allFinite();
+    frame.possible = possible();
+  }
+  if (frame.possible && estimate) {
     const auto variance = estimate->covariance.diagonal().cwiseMax(0.0);
-    frame.velocity_sigma = std::sqrt(variance.segment<3>(estimate_error::velocity).maxCoeff());
+    const Eigen::Matrix3d P_v = ordinary_covariance().block<3, 3>(estimate_error::velocity, estimate_error::velocity);
+    frame.velocity_sigma = std::sqrt(std::max(P_v.diagonal().maxCoeff(), 0.0));  // the anchor's yaw is another matter
     frame.horizontal_sigma = std::sqrt(variance.segment<2>(estimate_error::position).maxCoeff());
     frame.vertical_sigma = std::sqrt(variance(estimate_error::position + 2));
   }
   monitor_.add_frame(frame, log_.records(), imu_.newest().t_ns);
-  if (frame.running && !frame.finite) stop();
+  if (frame.running && !frame.possible) stop();
   if (!estimate || !usable()) return std::nullopt;
   estimate->health = monitor_.health();
   if (estimate->health.aiding != Aiding::none) last_good_ = estimate;
   return estimate;
 }
 
-void Filter::refuse_frame(TimeNs t_ns) {
-  if (!imu_.empty()) monitor_.add_refused_frame(imu_time(t_ns), imu_.newest().t_ns);
+/// Are the state and its covariance numbers, and no variance negative?
+bool Filter::possible() const {
+  const ImuState& x = state_.imu;
+  const OdometerState& o = state_.odometer;
+  const auto P = covariance_.matrix();
+  const bool finite = x.R_WB.allFinite() && x.p_WB.allFinite() && x.v_W.allFinite() && x.b_g.allFinite() &&
+                      x.b_a.allFinite() && state_.camera.T_BC0.R.allFinite() && state_.camera.T_BC0.p.allFinite() &&
+                      o.wheel_radius.allFinite() && std::isfinite(o.wheel_separation) && o.T_BO.R.allFinite() &&
+                      state_.ground.n_W.allFinite() && P.allFinite();
+  return finite && P.diagonal().minCoeff() >= 0.0;
+}
+
+void Filter::refuse_frame() {
+  if (!imu_.empty()) monitor_.add_refused_frame(imu_.newest().t_ns);
 }
 
 /// May the state be given away?
@@ -505,6 +527,7 @@ double Filter::trust(MotionSensor sensor) const {
 bool Filter::try_start(TimeNs t_ns, const ImuStatistics& imu, bool still) {
   if (status_ != Status::lost) status_ = imu.count < 2 ? Status::waiting_for_imu : Status::waiting_for_standstill;
   if (!still || imu.count < 2) return false;
+  if (std::abs(imu.accel_mean.norm() - kGravity_W.norm()) > kGravityTolerance) return false;
 
   ImuState& x = state_.imu;
   x = ImuState{};
@@ -1107,7 +1130,8 @@ double Filter::median_parallax_px(const Clone& from, const Clone& to) const {
 void Filter::update(const Eigen::Ref<const Eigen::MatrixXd>& H, int first_column,
                     const Eigen::Ref<const Eigen::VectorXd>& r) {
   const int considered = learn_calibration_ ? 0 : err::calibration_size;
-  boxplus_in_place(state_, covariance_.update(H, first_column, r, err::camera, considered));
+  const Eigen::Ref<const Eigen::VectorXd> correction = covariance_.update(H, first_column, r, err::camera, considered);
+  if (correction.allFinite()) boxplus_in_place(state_, correction);  // else the covariance shows it: possible()
 }
 
 int Filter::clone_index(std::uint64_t frame) const {
@@ -1117,7 +1141,7 @@ int Filter::clone_index(std::uint64_t frame) const {
 }
 
 std::optional<NavState> Filter::predict(TimeNs t_ns) const {
-  if (!usable()) return std::nullopt;
+  if (!usable() || !is_time(t_ns) || seconds_between(imu_.newest().t_ns, t_ns) > kLongestPredict) return std::nullopt;
   return anchor_.to_world(predict_here(t_ns));
 }
 
@@ -1133,16 +1157,20 @@ NavState Filter::predict_here(TimeNs t_ns) const {
 }
 
 /// From the invariant error to the ordinary one: dv = nu - [v]x theta, dp = rho - [p]x theta.
+ImuErrorMatrix Filter::ordinary_covariance() const {
+  const ImuState& x = state_.imu;
+  ImuErrorMatrix T = ImuErrorMatrix::Identity();
+  T.block<3, 3>(estimate_error::velocity, err::theta) = -skew(x.v_W);
+  T.block<3, 3>(estimate_error::position, err::theta) = -skew(x.p_WB);
+  return T * covariance_.matrix().topLeftCorner<err::imu_size, err::imu_size>() * T.transpose();
+}
+
 Estimate Filter::make_estimate() const {
   const ImuState& x = state_.imu;
   Estimate estimate;
   const NavState here = predict_here(x.t_ns);
   estimate.state = anchor_.to_world(here);
-  ImuErrorMatrix T = ImuErrorMatrix::Identity();
-  T.block<3, 3>(estimate_error::velocity, err::theta) = -skew(x.v_W);
-  T.block<3, 3>(estimate_error::position, err::theta) = -skew(x.p_WB);
-  estimate.covariance =
-      anchor_.to_world(T * covariance_.matrix().topLeftCorner<err::imu_size, err::imu_size>() * T.transpose(), here);
+  estimate.covariance = anchor_.to_world(ordinary_covariance(), here);
   estimate.frame = statistics_;
   estimate.consistency = consistency_;
   if (ground_known_) {

@@ -25,6 +25,7 @@
 #include "filter/health_monitor.h"
 #include "filter/impact_guard.h"
 #include "filter/imu_buffer.h"
+#include "filter/input_guard.h"
 #include "filter/moving_start.h"
 #include "filter/ring.h"
 #include "filter/source_log.h"
@@ -49,11 +50,13 @@ class Filter {
   /// Throws std::invalid_argument, naming the field, if a setting or the calibration is unusable.
   Filter(const FilterConfig& config, const Calibration& calibration);
 
-  /// Takes a sample in time order. One that is not finite, or not later than the one before, is refused and counted.
+  /// Takes a sample in time order. One that is not finite, implausible or not later than the one before is refused and
+  /// counted. Its stamps are the clock: after a hole of 2 s, or when they go on from an earlier time, all begins anew.
   void add_imu(const ImuSample& sample);
 
   /// Takes a reading in time order; it is used at its own time when the state passes it. One that is not later than the
-  /// one before, or far behind the state, is refused and counted. Without a calibration of its sensor it is ignored.
+  /// one before, far behind the state or far ahead of the inertial samples, is refused and counted. Without a
+  /// calibration of its sensor it is ignored.
   void add_encoder(const EncoderSample& sample);
   void add_laser(const LaserSample& sample);
 
@@ -61,20 +64,24 @@ class Filter {
   /// the start only the rotation is known. Nothing if no frame came yet, or no samples.
   [[nodiscard]] std::optional<RelativeMotion> motion_to(TimeNs t_ns) const;
 
-  /// Takes the features of one frame. The estimate at the frame's time, or nothing while it cannot start.
+  /// Takes the features of one frame. The estimate at the frame's time, or nothing while it cannot start. Features that
+  /// are not finite, that no camera can see, or that come twice are left out and counted.
   std::optional<Estimate> process(const FeatureFrame& frame);
 
   /// The same at a time without an image, from all other sensors; a camera's stamp. Tracks go on over it.
   std::optional<Estimate> process_without_image(TimeNs t_ns);
 
-  /// The newest state carried on by the samples to `t_ns` (IMU time). Nothing before the start.
+  /// The newest state carried on by the samples to `t_ns` (IMU time). Nothing before the start, while lost, and later
+  /// than 0.5 s after the newest sample.
   [[nodiscard]] std::optional<NavState> predict(TimeNs t_ns) const;
 
   [[nodiscard]] Status status() const;
   [[nodiscard]] const Health& health() const { return monitor_.health(); }
   /// Tells the health of a frame that no inertial samples reach.
-  void refuse_frame(TimeNs t_ns);
-  [[nodiscard]] const InputCounts& input_counts() const { return counts_; }  ///< of samples; frames are the caller's
+  void refuse_frame();
+  [[nodiscard]] const InputCounts& input_counts() const {
+    return guard_.counts();
+  }                                               ///< of samples; frames are the caller's
   [[nodiscard]] bool covers(TimeNs t_ns) const;   ///< are there inertial samples (nearly) up to the frame's time?
   [[nodiscard]] bool is_next(TimeNs t_ns) const;  ///< is a frame with this stamp later than the one before?
   [[nodiscard]] TimeNs camera_time(TimeNs imu_time_ns) const;  ///< the stamp that the camera has at that time
@@ -96,6 +103,8 @@ class Filter {
   static constexpr TimeNs kDisagrees = -1;
 
   [[nodiscard]] TimeNs imu_time(TimeNs camera_time_ns) const;
+  [[nodiscard]] std::optional<TimeNs> state_time() const;
+  void restart(TimeNs t_ns, TimeNs clock_shift);
   void mend_spike(const ImuSample& next);
   bool try_start(TimeNs t_ns, const ImuStatistics& imu, bool still);
   bool try_rolling_start();
@@ -114,6 +123,7 @@ class Filter {
   void use_image(const FeatureFrame& frame, bool still);
   [[nodiscard]] std::optional<Estimate> finish_frame(bool image, const FrameAgreement& agreement);
   [[nodiscard]] NavState predict_here(TimeNs t_ns) const;
+  [[nodiscard]] bool possible() const;
   [[nodiscard]] bool usable() const;
   void advance(TimeNs t_ns);
   void advance_measuring(TimeNs t_ns);
@@ -142,6 +152,7 @@ class Filter {
   [[nodiscard]] double median_parallax_px(const Clone& from, const Clone& to) const;
   void update(const Eigen::Ref<const Eigen::MatrixXd>& H, int first_column, const Eigen::Ref<const Eigen::VectorXd>& r);
   [[nodiscard]] int clone_index(std::uint64_t frame) const;
+  [[nodiscard]] ImuErrorMatrix ordinary_covariance() const;
   [[nodiscard]] Estimate make_estimate() const;
 
   FilterConfig config_;
@@ -154,14 +165,13 @@ class Filter {
   State state_;
   Covariance covariance_;
   ImuBuffer imu_;
-  InputCounts counts_;
+  InputGuard guard_;
   ImpactGuard impact_guard_;
   Eigen::Vector3d rate_B_ = Eigen::Vector3d::Zero();  ///< mean rate of the last piece integrated, bias removed [rad/s]
   std::optional<EncoderReader> encoder_;
-  Ring<WheelTurn> turns_;                 ///< not yet passed by the state
-  Ring<BeamRanges> ranges_;               ///< the same
-  std::optional<WheelTurn> passed_turn_;  ///< the last one that was
-  TimeNs last_range_ns_ = 0;
+  Ring<WheelTurn> turns_;                            ///< not yet passed by the state
+  Ring<BeamRanges> ranges_;                          ///< the same
+  std::optional<WheelTurn> passed_turn_;             ///< the last one that was
   bool ground_known_ = false;                        ///< the lasers saw the ground since it was last touched
   std::optional<WheelPreintegration> displacement_;  ///< since the newest clone
   Ring<WheelTurn> displacement_turns_;               ///< not yet used up by it

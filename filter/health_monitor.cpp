@@ -26,7 +26,8 @@ constexpr double kScatterMemory = 2.0;  // [s]
 constexpr double kMostScatter = 0.1;    // [rad/s]
 constexpr double kMisled = 1.5;         // [s] after wheels that did not fit
 constexpr int kStampsToKnow = 20;
-constexpr double kStampOff = 0.06;  // [s] off the usual
+constexpr double kLongestDelay = 0.1;  // [s] that may be usual
+constexpr double kStampOff = 0.06;     // [s] off the usual
 constexpr double kStampSpreads = 6.0;
 constexpr double kStampMemory = 1000.0;  // stamps
 constexpr double kUnaided = 2.0;         // [s] that inertia alone may carry the estimate
@@ -65,7 +66,7 @@ void Trust::excuse(TimeNs t_ns) {
 
 bool StampWatch::add(TimeNs stamp_ns, TimeNs imu_ns) {
   const double ahead = seconds_between(imu_ns, stamp_ns);
-  if (count_ == 0) usual_ = ahead;
+  if (count_ == 0) usual_ = std::clamp(ahead, -kLongestDelay, kLongestDelay);  // the first one may be false
   const double off = std::abs(ahead - usual_);
   const double share = std::max(1.0 / kStampMemory, 1.0 / (count_ + 1));
   const bool unusual = count_ >= kStampsToKnow && off > std::max(kStampOff, kStampSpreads * spread_);
@@ -85,11 +86,24 @@ void HealthMonitor::accuse(std::initializer_list<Source> sources, TimeNs t_ns) {
   for (const Source source : sources) trust(source).accuse(t_ns);
 }
 
-void HealthMonitor::add_imu(const ImuSample& sample, bool refused, double max_gap) {
-  const TimeNs t_ns = last_imu_ ? std::max(last_imu_->t_ns, sample.t_ns) : sample.t_ns;
+void HealthMonitor::succeed(const HealthMonitor& before, TimeNs t_ns) {
+  started_ = before.started_;
+  health_.reset_counter = before.health_.reset_counter;
+  accuse({Source::gyroscope, Source::accelerometer}, t_ns);
+  decide(t_ns);
+  health_.since_ns = t_ns;
+}
+
+void HealthMonitor::add_refused_imu() {
+  if (!last_imu_) return;
+  accuse({Source::gyroscope, Source::accelerometer}, last_imu_->t_ns);
+  decide(last_imu_->t_ns);
+}
+
+void HealthMonitor::add_imu(const ImuSample& sample, double max_gap) {
+  const TimeNs t_ns = sample.t_ns;
   const bool gap = last_imu_ && seconds_between(last_imu_->t_ns, sample.t_ns) > max_gap;
-  if (refused || gap) accuse({Source::gyroscope, Source::accelerometer}, t_ns);
-  if (refused) return;
+  if (gap) accuse({Source::gyroscope, Source::accelerometer}, t_ns);
   if (last_imu_) {
     const auto clipped = [](const Eigen::Vector3d& a, const Eigen::Vector3d& b, double least) {
       for (int axis = 0; axis < 3; ++axis) {
@@ -111,14 +125,16 @@ void HealthMonitor::add_spike(bool gyro, bool accel, TimeNs t_ns) {
   if (accel) accuse({Source::accelerometer}, t_ns);
 }
 
-void HealthMonitor::add_encoder(const EncoderSample& sample, TimeNs imu_ns) {
+void HealthMonitor::add_encoder(const EncoderSample& sample, Verdict verdict, TimeNs imu_ns) {
   last_encoder_ns_ = imu_ns;
-  if (encoder_stamps_.add(sample.t_ns, imu_ns)) accuse({Source::wheel_left, Source::wheel_right}, imu_ns);
+  if (verdict == Verdict::impossible || encoder_stamps_.add(sample.t_ns, imu_ns))
+    accuse({Source::wheel_left, Source::wheel_right}, imu_ns);
 }
 
-void HealthMonitor::add_laser(const LaserSample& sample, const LaserCalibration& lasers, TimeNs imu_ns) {
+void HealthMonitor::add_laser(const LaserSample& sample, Verdict verdict, const LaserCalibration& lasers,
+                              TimeNs imu_ns) {
   last_laser_ns_ = imu_ns;
-  const bool unusual = laser_stamps_.add(sample.t_ns, imu_ns);
+  const bool unusual = verdict == Verdict::impossible || laser_stamps_.add(sample.t_ns, imu_ns);
   for (std::size_t beam = 0; beam < std::min(beams_, sample.range.size()); ++beam) {
     const double range = sample.range[beam];
     no_return_[beam] = !(range >= lasers.range_min && range <= lasers.range_max);
@@ -130,7 +146,7 @@ void HealthMonitor::add_laser(const LaserSample& sample, const LaserCalibration&
 }
 
 /// Whose clock is wrong? Where the inertial samples went on since the last refusal, it is not theirs.
-void HealthMonitor::add_refused_frame(TimeNs, TimeNs imu_ns) {
+void HealthMonitor::add_refused_frame(TimeNs imu_ns) {
   const bool imu_goes_on = last_refused_imu_ns_ && imu_ns > *last_refused_imu_ns_;
   last_refused_imu_ns_ = imu_ns;
   if (!imu_goes_on) {
@@ -225,7 +241,7 @@ void HealthMonitor::judge_ground(const Frame& frame, const std::array<SourceReco
 /// How the cameras turn against the gyroscope, over the last moments.
 void HealthMonitor::judge_turn(const Frame& frame) {
   const FrameAgreement& seen = frame.agreement;
-  if (!frame.image || !frame.running || frame_interval_ <= 0.0) return;
+  if (!frame.image || !frame.running || !frame.possible || frame_interval_ <= 0.0) return;
   const double share = 1.0 - std::exp(-frame_interval_ / kTurnMemory);
   // A velocity that wheels led astray looks like a turn as well.
   if (frame.statistics.wheel_rows_rejected > 0) misled_ns_ = frame.t_ns;
@@ -268,7 +284,7 @@ void HealthMonitor::decide(TimeNs t_ns) {
     health_.untrusted.set(source);
     health_.onset_ns[source] = trust_[source].onset_ns();
   }
-  const bool usable = last_.running && last_.finite && seconds_between(aided_ns_, t_ns) < kUnaided &&
+  const bool usable = last_.running && last_.possible && seconds_between(aided_ns_, t_ns) < kUnaided &&
                       last_.velocity_sigma < kWorstVelocity && !contradicted_;
   const HealthStatus status = !started_                 ? HealthStatus::initialising
                               : !usable                 ? HealthStatus::lost

@@ -10,6 +10,7 @@
 #include "ear/health.h"
 #include "ear/odometry.h"
 #include "filter/frame_check.h"
+#include "filter/input_guard.h"
 
 namespace ear {
 
@@ -54,21 +55,27 @@ class HealthMonitor {
  public:
   explicit HealthMonitor(const Calibration& calibration, bool uses_wheels, bool uses_beams);
 
-  /// A sample as it comes, before it is used. `refused`: its stamp or its values cannot be.
-  void add_imu(const ImuSample& sample, bool refused, double max_gap);
-  void add_spike(bool gyro, bool accel, TimeNs t_ns);
-  void add_encoder(const EncoderSample& sample, TimeNs imu_ns);
-  void add_laser(const LaserSample& sample, const LaserCalibration& lasers, TimeNs imu_ns);
+  /// For an estimator that begins anew: lost from `t_ns` on, if the one before had an estimate.
+  void succeed(const HealthMonitor& before, TimeNs t_ns);
 
-  /// A frame that no inertial samples reach, or that is not later than the one before; IMU time.
-  void add_refused_frame(TimeNs t_ns, TimeNs imu_ns);
+  /// A sample as it comes, before it is used.
+  void add_imu(const ImuSample& sample, double max_gap);
+  /// One whose stamp or values cannot be.
+  void add_refused_imu();
+  void add_spike(bool gyro, bool accel, TimeNs t_ns);
+  /// A reading, used or refused, and the stamp of the newest inertial sample.
+  void add_encoder(const EncoderSample& sample, Verdict verdict, TimeNs imu_ns);
+  void add_laser(const LaserSample& sample, Verdict verdict, const LaserCalibration& lasers, TimeNs imu_ns);
+
+  /// A frame that no inertial samples reach.
+  void add_refused_frame(TimeNs imu_ns);
 
   /// What is known after a frame was used.
   struct Frame {
     TimeNs t_ns = 0;       ///< IMU time
     bool image = true;     ///< false: the estimator moved on without one
     bool running = false;  ///< there is a state
-    bool finite = true;    ///< and it and its covariance are numbers
+    bool possible = true;  ///< and it and its covariance are numbers, variances not negative
     bool lifted = false;   ///< the vehicle just left the ground or met it, whatever is known of its contact
     FrameAgreement agreement;
     FrameStatistics statistics;

@@ -1,8 +1,20 @@
 #include "filter/wheels.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace ear {
+
+double EncoderReader::angle(std::int64_t from, std::int64_t to) const {
+  std::int64_t d = to - from;
+  if (calibration_.wraps) {
+    const std::int64_t n = calibration_.resolution;
+    d %= n;
+    if (2 * d >= n) d -= n;
+    if (2 * d < -n) d += n;
+  }
+  return 2.0 * M_PI * static_cast<double>(d) / static_cast<double>(calibration_.resolution);
+}
 
 std::optional<WheelTurn> EncoderReader::add(const EncoderSample& sample) {
   const EncoderSample before = last_;
@@ -10,20 +22,10 @@ std::optional<WheelTurn> EncoderReader::add(const EncoderSample& sample) {
   last_ = sample;
   any_ = true;
   if (first) return std::nullopt;
-  const auto difference = [&](std::int64_t from, std::int64_t to) {
-    std::int64_t d = to - from;
-    if (calibration_.wraps) {
-      const std::int64_t n = calibration_.resolution;
-      d %= n;
-      if (2 * d >= n) d -= n;
-      if (2 * d < -n) d += n;
-    }
-    return 2.0 * M_PI * static_cast<double>(d) / static_cast<double>(calibration_.resolution);
-  };
   WheelTurn turn;
   turn.from_ns = before.t_ns;
   turn.to_ns = sample.t_ns;
-  turn.angle = {difference(before.left_count, sample.left_count), difference(before.right_count, sample.right_count)};
+  turn.angle = {angle(before.left_count, sample.left_count), angle(before.right_count, sample.right_count)};
   return turn;
 }
 
@@ -32,6 +34,11 @@ void WheelRows::take_one_wheel(double lever) {
   H.row(speed) += lever * H.row(yaw_rate);
   H(speed, ground_column(err::wheel_separation)) -= lever * residual(yaw_rate);  // the lever grows with it
   J_gyro.row(speed) += lever * J_gyro.row(yaw_rate);
+}
+
+double EncoderReader::largest_angle(const EncoderSample& sample) const {
+  return std::max(std::abs(angle(last_.left_count, sample.left_count)),
+                  std::abs(angle(last_.right_count, sample.right_count)));
 }
 
 WheelRows linearize_wheels(const State& x, const Eigen::Matrix3d& R_WB, const Eigen::Vector3d& v_W,

@@ -30,11 +30,16 @@ class EncoderReader {
   /// not turn by more than half a revolution between readings.
   [[nodiscard]] std::optional<WheelTurn> add(const EncoderSample& sample);
 
+  /// How far the faster wheel turned since the reading before, which must be there [rad].
+  [[nodiscard]] double largest_angle(const EncoderSample& sample) const;
+
   [[nodiscard]] bool any() const { return any_; }
   [[nodiscard]] TimeNs last_ns() const { return last_.t_ns; }
   void clear() { any_ = false; }
 
  private:
+  [[nodiscard]] double angle(std::int64_t from, std::int64_t to) const;
+
   EncoderCalibration calibration_;
   EncoderSample last_;
   bool any_ = false;

@@ -57,6 +57,8 @@ class Stopwatch {
 };
 
 void check_size(const ImageView& image, const CameraCalibration& camera, const char* name) {
+  const bool readable = image.data != nullptr && image.stride >= image.width;
+  if (!readable) throw std::invalid_argument(std::string(name) + " image has no pixels, or rows that overlap");
   if (image.width == camera.width && image.height == camera.height) return;
   throw std::invalid_argument(std::string(name) + " image is " + std::to_string(image.width) + "x" +
                               std::to_string(image.height) + ", its calibration says " + std::to_string(camera.width) +

@@ -345,13 +345,13 @@ ear_result ear_counts_of(const ear_odometry* odometry, ear_counts* counts) {
     counts->encoder_overflow = overflows.encoder;
     counts->laser_overflow = overflows.laser;
     counts->frame_overflow = overflows.frames;
-    counts->imu_rejected = inputs.imu_rejected;
-    counts->encoder_rejected = inputs.encoder_rejected;
-    counts->laser_rejected = inputs.laser_rejected;
+    counts->imu_rejected = inputs.imu.rejected();
+    counts->encoder_rejected = inputs.encoder.rejected();
+    counts->laser_rejected = inputs.laser.rejected();
     counts->imu_spikes = inputs.imu_spikes;
-    counts->imu_gaps = inputs.imu_gaps;
-    counts->frames_rejected = inputs.frames_rejected;
-    counts->frames_without_imu = inputs.frames_without_imu;
+    counts->imu_gaps = inputs.imu.gaps;
+    counts->frames_rejected = inputs.camera.rejected() - inputs.camera.far_ahead;
+    counts->frames_without_imu = inputs.camera.far_ahead;
     return EAR_OK;
   });
 }

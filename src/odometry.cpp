@@ -2,13 +2,16 @@
 #include "ear/odometry.h"
 
 #include <chrono>
-#include <stdexcept>
+#include <exception>
 
 #include "filter/filter.h"
+#include "filter/stamp_guard.h"
 #include "frontend/frontend.h"
 
 namespace ear {
 namespace {
+
+constexpr double kFrameGap = 0.25;  // [s] between two frames: a hole
 
 MotionPrediction to_prediction(const std::optional<RelativeMotion>& motion) {
   MotionPrediction prediction;
@@ -35,20 +38,30 @@ class Odometry::Impl {
 
   std::optional<Estimate> add_stereo(const StereoFrame& frame) {
     stage_times_ = StageTimes{};
-    if (!accepts(frame.t_ns)) return std::nullopt;
-    const FeatureFrame* const features = track(frame);
-    if (features == nullptr) {
-      ++frames_rejected_;
+    if (!accepts(frame.t_ns, camera_)) {
+      if (is_time(frame.t_ns) && filter_.is_next(frame.t_ns)) filter_.refuse_frame();
       return std::nullopt;
     }
+    const FeatureFrame* const features = track(frame);
+    if (features == nullptr) {
+      ++camera_.implausible;
+      return std::nullopt;
+    }
+    if (last_frame_ns_ && seconds_between(*last_frame_ns_, frame.t_ns) > kFrameGap) ++camera_.gaps;
+    last_frame_ns_ = frame.t_ns;
+    ++camera_.accepted;
     return update(*features);
   }
 
   std::optional<Estimate> step(TimeNs t_ns) {
     stage_times_ = StageTimes{};
     FeatureFrame nothing;
+    if (!is_time(t_ns)) {
+      ++steps_.implausible;
+      return std::nullopt;
+    }
     nothing.t_ns = filter_.camera_time(t_ns);
-    return accepts(nothing.t_ns) ? update(nothing) : std::nullopt;
+    return accepts(nothing.t_ns, steps_) ? update(nothing) : std::nullopt;
   }
 
   [[nodiscard]] const Filter& filter() const { return filter_; }
@@ -56,8 +69,8 @@ class Odometry::Impl {
 
   [[nodiscard]] InputCounts input_counts() const {
     InputCounts counts = filter_.input_counts();
-    counts.frames_rejected = frames_rejected_;
-    counts.frames_without_imu = frames_without_imu_;
+    counts.camera = camera_;
+    counts.steps_rejected = steps_.rejected();
     return counts;
   }
 
@@ -90,17 +103,17 @@ class Odometry::Impl {
  private:
   /// Is a frame with this stamp later than the one before, and are its inertial samples there? Counts those that are
   /// not.
-  bool accepts(TimeNs t_ns) {
-    if (!filter_.is_next(t_ns)) {
-      ++frames_rejected_;
-      return false;
+  bool accepts(TimeNs t_ns, StreamCounts& counts) const {
+    if (!is_time(t_ns)) {
+      ++counts.implausible;
+    } else if (!filter_.is_next(t_ns)) {
+      ++counts.not_later;
+    } else if (!filter_.covers(t_ns)) {
+      ++counts.far_ahead;
+    } else {
+      return true;
     }
-    if (!filter_.covers(t_ns)) {
-      ++frames_without_imu_;
-      filter_.refuse_frame(t_ns);
-      return false;
-    }
-    return true;
+    return false;
   }
 
   std::optional<Estimate> update(const FeatureFrame& features) {
@@ -123,7 +136,7 @@ class Odometry::Impl {
       stage_times_.stereo = timing.stereo;
       stage_times_.reject = timing.reject;
       return &features;
-    } catch (const std::invalid_argument&) {  // one bad image must not take the vehicle its estimator; it is counted
+    } catch (const std::exception&) {  // one bad image must not take the vehicle its estimator; it is counted
       return nullptr;
     }
   }
@@ -133,8 +146,9 @@ class Odometry::Impl {
   Filter filter_;
   std::optional<Frontend> frontend_;  ///< with a camera
   StageTimes stage_times_;
-  std::uint64_t frames_rejected_ = 0;
-  std::uint64_t frames_without_imu_ = 0;
+  StreamCounts camera_;
+  StreamCounts steps_;
+  std::optional<TimeNs> last_frame_ns_;
 };
 
 Odometry::Odometry(const Config& config, const Calibration& calibration)

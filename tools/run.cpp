@@ -110,6 +110,18 @@ std::string progress_line(const ReplayedFrame& frame, const Odometry& odometry, 
   return line.data();
 }
 
+/// What a stream delivered, as "imu_accepted", "imu_not_finite", ...
+void add_counts(RunSummary& summary, const std::string& stream, const StreamCounts& counts) {
+  const auto add = [&](const char* what, std::uint64_t count) { summary.counts.emplace_back(stream + what, count); };
+  add("_accepted", counts.accepted);
+  add("_not_finite", counts.not_finite);
+  add("_implausible", counts.implausible);
+  add("_not_later", counts.not_later);
+  add("_far_ahead", counts.far_ahead);
+  add("_too_late", counts.too_late);
+  add("_gaps", counts.gaps);
+}
+
 RunSummary summarize(const RunArguments& args, const Recording& recording, const Odometry& odometry,
                      const Totals& totals, double wall_time) {
   RunSummary summary;
@@ -124,13 +136,14 @@ RunSummary summarize(const RunArguments& args, const Recording& recording, const
                     {"wheel_rows_rejected", totals.wheel_rows_rejected},
                     {"beams_used", totals.beams_used},
                     {"beams_rejected", totals.beams_rejected},
-                    {"encoder_rejected", inputs.encoder_rejected},
-                    {"laser_rejected", inputs.laser_rejected},
-                    {"imu_rejected", inputs.imu_rejected},
                     {"imu_spikes", inputs.imu_spikes},
-                    {"imu_gaps", inputs.imu_gaps},
-                    {"frames_rejected", inputs.frames_rejected},
-                    {"frames_without_imu", inputs.frames_without_imu}};
+                    {"wild_features", inputs.features_rejected},
+                    {"steps_rejected", inputs.steps_rejected},
+                    {"resets", odometry.health().reset_counter}};
+  add_counts(summary, "imu", inputs.imu);
+  add_counts(summary, "camera", inputs.camera);
+  add_counts(summary, "encoder", inputs.encoder);
+  add_counts(summary, "laser", inputs.laser);
   summary.duration_s = seconds_between(recording.span().first_ns, recording.span().last_ns);
   summary.wall_time_s = wall_time;
   const StageTimes& t = totals.times;

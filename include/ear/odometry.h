@@ -98,15 +98,29 @@ struct Estimate {
   Health health;
 };
 
-/// What was refused or bridged since the start; nothing is lost silently.
+/// What one stream delivered. Every sample is counted once: as accepted, or by the reason why it was refused.
+struct StreamCounts {
+  std::uint64_t accepted = 0;
+  std::uint64_t not_finite = 0;   ///< NaN or infinite; a laser beam's NaN is no return, and none of these
+  std::uint64_t implausible = 0;  ///< no sensor measures it: wrong unit, broken message, images that do not fit
+  std::uint64_t not_later = 0;    ///< a duplicate, or earlier than the sample before
+  std::uint64_t far_ahead = 0;    ///< a stamp far ahead of the others that nothing confirms
+  std::uint64_t too_late = 0;     ///< so far behind the state that it cannot be used any more
+  std::uint64_t gaps = 0;         ///< holes in what was accepted; not a refusal
+
+  [[nodiscard]] std::uint64_t rejected() const { return not_finite + implausible + not_later + far_ahead + too_late; }
+};
+
+/// What was refused or bridged since the start; nothing is lost silently. How far the samples accepted agree with the
+/// state is in Health::sources.
 struct InputCounts {
-  std::uint64_t imu_rejected = 0;        ///< not finite, or not later than the sample before
-  std::uint64_t imu_spikes = 0;          ///< single samples far from both their neighbours, whose mean was taken
-  std::uint64_t imu_gaps = 0;            ///< holes longer than FilterConfig::max_imu_gap
-  std::uint64_t frames_rejected = 0;     ///< not later than the frame before, or images that do not fit the calibration
-  std::uint64_t frames_without_imu = 0;  ///< no inertial samples reach the frame's time
-  std::uint64_t encoder_rejected = 0;    ///< not later than the sample before, or too late to be used
-  std::uint64_t laser_rejected = 0;      ///< the same, or a number of ranges other than that of the beams
+  StreamCounts imu;              ///< gaps: longer than FilterConfig::max_imu_gap
+  StreamCounts encoder;          ///< gaps: longer than 0.25 s
+  StreamCounts laser;            ///< gaps: longer than 0.25 s
+  StreamCounts camera;           ///< frames; far_ahead: no inertial samples reach their time; gaps: longer than 0.25 s
+  std::uint64_t imu_spikes = 0;  ///< single samples far from both their neighbours, whose mean was taken
+  std::uint64_t features_rejected = 0;  ///< not finite, outside any image, or twice in a frame
+  std::uint64_t steps_rejected = 0;     ///< calls of Odometry::step for a time not later than the state, or without IMU
 };
 
 /// Time spent in the last add_stereo [s].

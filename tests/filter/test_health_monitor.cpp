@@ -42,13 +42,14 @@ struct Drive {
 
   void imu_until(double end) {
     for (; imu_t <= end; imu_t += 0.01)
-      monitor.add_imu({at(imu_t), {0.0, 0.0, 1e-3 * imu_t}, {0.0, 0.0, 9.8 + 1e-3 * imu_t}}, false, 0.05);
+      monitor.add_imu({at(imu_t), {0.0, 0.0, 1e-3 * imu_t}, {0.0, 0.0, 9.8 + 1e-3 * imu_t}}, 0.05);
   }
   void go_on(double duration) {
     for (const double end = t + duration; t < end; t += 0.05) {
       imu_until(t);
-      monitor.add_encoder({at(t), 0, 0}, at(t));
-      monitor.add_laser({at(t), {0.1 + 1e-3 * t, 0.2 + 1e-3 * t, 0.3 + 1e-3 * t}}, LaserCalibration{}, at(t));
+      monitor.add_encoder({at(t), 0, 0}, Verdict::accepted, at(t));
+      monitor.add_laser({at(t), {0.1 + 1e-3 * t, 0.2 + 1e-3 * t, 0.3 + 1e-3 * t}}, Verdict::accepted,
+                        LaserCalibration{}, at(t));
       frame.t_ns = at(t);
       monitor.add_frame(frame, records, at(t));
     }
@@ -170,8 +171,8 @@ TEST_CASE("health: a frozen image, a stuck beam, a gap, a clipped value, a jumpi
     Drive drive;
     drive.go_on(1.0);
     for (int i = 0; i < 20; ++i)
-      drive.monitor.add_laser({at(1.0 + 0.02 * i), {0.1, 0.2 + 1e-3 * i, 0.3 + 1e-3 * i}}, LaserCalibration{},
-                              at(1.0 + 0.02 * i));
+      drive.monitor.add_laser({at(1.0 + 0.02 * i), {0.1, 0.2 + 1e-3 * i, 0.3 + 1e-3 * i}}, Verdict::accepted,
+                              LaserCalibration{}, at(1.0 + 0.02 * i));
     drive.go_on(0.05);
     CHECK(degraded_by(drive, Source::beam_0));
     CHECK(drive.health().untrusted.count() == 1);
@@ -188,7 +189,7 @@ TEST_CASE("health: a frozen image, a stuck beam, a gap, a clipped value, a jumpi
     Drive drive;
     drive.go_on(1.0);
     for (int i = 0; i < 2; ++i, drive.imu_t += 0.01) {
-      drive.monitor.add_imu({at(drive.imu_t), Eigen::Vector3d::Zero(), {39.2, 0.0, 9.8}}, false, 0.05);
+      drive.monitor.add_imu({at(drive.imu_t), Eigen::Vector3d::Zero(), {39.2, 0.0, 9.8}}, 0.05);
     }
     drive.go_on(0.05);
     CHECK(degraded_by(drive, Source::accelerometer));
@@ -197,7 +198,7 @@ TEST_CASE("health: a frozen image, a stuck beam, a gap, a clipped value, a jumpi
   SUBCASE("clock") {
     Drive drive;
     drive.go_on(2.0);
-    drive.monitor.add_encoder({at(2.1), 0, 0}, at(1.99));
+    drive.monitor.add_encoder({at(2.1), 0, 0}, Verdict::accepted, at(1.99));
     drive.go_on(0.05);
     CHECK(degraded_by(drive, Source::wheel_left));
   }
@@ -218,10 +219,10 @@ TEST_CASE("health: images that contradict the state for a second, and no wheels:
 TEST_CASE("health: what is not a number, or a velocity that may be anything, is lost") {
   Drive drive;
   drive.go_on(1.0);
-  drive.frame.finite = false;
+  drive.frame.possible = false;
   drive.go_on(0.05);
   CHECK(drive.health().status == HealthStatus::lost);
-  drive.frame.finite = true;
+  drive.frame.possible = true;
   drive.go_on(0.1);
   CHECK(drive.health().status == HealthStatus::tracking);
   drive.frame.velocity_sigma = std::numeric_limits<double>::infinity();

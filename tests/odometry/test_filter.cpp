@@ -207,8 +207,10 @@ TEST_CASE("filter: samples that are not numbers, late or twice are refused and c
   sample.gyro_B.x() = 0.0;
   sample.accel_B.z() = std::numeric_limits<double>::infinity();
   filter.add_imu(sample);
-  CHECK(filter.input_counts().imu_rejected == 4);
-  CHECK(filter.input_counts().imu_gaps == 0);
+  CHECK(filter.input_counts().imu.accepted == 1);
+  CHECK(filter.input_counts().imu.not_later == 2);
+  CHECK(filter.input_counts().imu.not_finite == 2);
+  CHECK(filter.input_counts().imu.gaps == 0);
 }
 
 TEST_CASE("filter: wild observations do no harm") {
@@ -253,7 +255,7 @@ TEST_CASE("filter: a hole in the inertial data is counted and survived") {
     feed.until_frame(simulation.frame_times()[i], receiver);
     estimate = filter.process(simulation.tracks(i));
   }
-  CHECK(filter.input_counts().imu_gaps == 1);
+  CHECK(filter.input_counts().imu.gaps == 1);
   REQUIRE(estimate);
   const simulator::Truth truth = simulation.truth(estimate->state.t_ns);
   CHECK((estimate->state.v_W.norm() - truth.v_W.norm()) < 0.1);

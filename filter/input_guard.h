@@ -1,0 +1,65 @@
+// Whether a sample can be true, before anything is done with it; what cannot is refused and counted. docs/filter.md,
+// section 14.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "ear/calibration.h"
+#include "ear/odometry.h"
+#include "ear/types.h"
+#include "filter/stamp_guard.h"
+#include "filter/wheels.h"
+
+namespace ear {
+
+struct ImuVerdict {
+  bool accepted = false;
+  bool begins_anew = false;  ///< after a hole of 2 s, or with another clock: where the vehicle is now nobody knows
+  TimeNs clock_shift = 0;    ///< what the stamps before are to be moved by, if the clock was set back [ns]
+};
+
+enum class Verdict : std::uint8_t {
+  accepted,
+  impossible,  ///< no sound sensor delivers it
+  mistimed     ///< not later than the one before, or far from the inertial samples
+};
+
+class InputGuard {
+ public:
+  /// `max_imu_gap`: longer holes are counted [s].
+  InputGuard(const Calibration& calibration, double max_imu_gap);
+
+  [[nodiscard]] ImuVerdict judge(const ImuSample& sample);
+
+  /// `state_ns`: time of the state, if there is one. `reader`, which did not see the reading yet, begins anew where
+  /// readings are missing, and where the wheels turned faster than wheels do.
+  [[nodiscard]] Verdict judge(const EncoderSample& sample, std::optional<TimeNs> state_ns, EncoderReader& reader);
+  [[nodiscard]] Verdict judge(const LaserSample& sample, std::optional<TimeNs> state_ns);
+
+  /// The frame without the features that cannot be; the frame itself if there are none. Valid until the next call.
+  [[nodiscard]] const FeatureFrame& sound(const FeatureFrame& frame);
+
+  /// The filter begins anew: forgets the readings, but not the inertial clock nor the counts.
+  void restart();
+
+  [[nodiscard]] const InputCounts& counts() const { return counts_; }
+  void count_spike() { ++counts_.imu_spikes; }
+
+ private:
+  [[nodiscard]] bool takes_stamp(TimeNs t_ns, std::optional<TimeNs> state_ns, std::optional<TimeNs>& last_ns,
+                                 StreamCounts& counts) const;
+
+  double max_imu_gap_;
+  std::size_t beam_count_;
+  InputCounts counts_;
+  StampGuard imu_stamps_;
+  std::optional<TimeNs> imu_ns_;           ///< the newest inertial sample accepted
+  std::optional<TimeNs> last_encoder_ns_;  ///< the newest reading accepted
+  std::optional<TimeNs> last_laser_ns_;    ///< the same
+  FeatureFrame sound_frame_;
+  std::vector<std::uint64_t> ids_;
+};
+
+}  // namespace ear

@@ -1,0 +1,40 @@
+// Whether a stamp is to be believed. One false stamp must not shut out the samples that follow it.
+#pragma once
+
+#include <cstdint>
+
+#include "ear/types.h"
+
+namespace ear {
+
+/// Stamps farther from zero than this [ns], 142 years, are no times: their differences could overflow.
+inline constexpr TimeNs kLargestTime = 4'500'000'000'000'000'000;
+[[nodiscard]] constexpr bool is_time(TimeNs t_ns) { return t_ns > -kLargestTime && t_ns < kLargestTime; }
+
+enum class Stamp : std::uint8_t {
+  next,       ///< follows the one before
+  after_gap,  ///< the stream returns: a step ahead that further stamps have confirmed
+  set_back,   ///< the clock was set back: stamps have gone on from an earlier time for a second
+  not_later,  ///< refused: a duplicate, or earlier
+  far_ahead   ///< refused: a step ahead that nothing confirms yet
+};
+
+/// The stamps of the inertial samples, which are the filter's clock.
+class StampGuard {
+ public:
+  /// `t_ns` must be a time.
+  [[nodiscard]] Stamp judge(TimeNs t_ns);
+
+  /// After set_back: what the earlier stamps are to be moved by to be stamps of the clock as it goes now [ns].
+  [[nodiscard]] TimeNs clock_shift() const { return clock_shift_; }
+
+ private:
+  bool any_ = false;
+  TimeNs last_ns_ = 0;      ///< of those believed
+  TimeNs run_from_ns_ = 0;  ///< stamps in a row that follow each other, but not last_ns_: the first
+  TimeNs run_to_ns_ = 0;    ///< and the last
+  int run_ = 0;             ///< how many
+  TimeNs clock_shift_ = 0;
+};
+
+}  // namespace ear
