@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <initializer_list>
 #include <limits>
 #include <stdexcept>
 #include <string>
@@ -35,6 +36,7 @@ constexpr double kHeldSample = 0.04;           // [s] so far the newest IMU samp
 constexpr double kGapNoiseFactor = 10.0;       // on the noise densities while a gap in the IMU data is bridged
 constexpr double kStartGravityNoise = 0.02;    // [m/s^2] what idling rotors leave in the mean specific force
 constexpr double kKnownSigma = 1e-6;           // [m, rad] of position and yaw at the start: by definition zero
+constexpr double kKnownScale = 1e-6;           // of the wheels where nothing can tell it
 constexpr double kUnknownTilt = 0.3;           // [rad] before gravity was measured
 constexpr double kLeastStartSpeed = 0.2;       // [m/s] slower is as good as standing
 constexpr double kUnseenSpeed = 1.0;           // [m/s] that the vehicle may have gained since it was lost
@@ -359,8 +361,9 @@ std::optional<Estimate> Filter::finish_frame(bool image, const FrameAgreement& a
   }
   if (frame.possible && estimate) {
     const auto variance = estimate->covariance.diagonal().cwiseMax(0.0);
-    const Eigen::Matrix3d P_v = ordinary_covariance().block<3, 3>(estimate_error::velocity, estimate_error::velocity);
-    frame.velocity_sigma = std::sqrt(std::max(P_v.diagonal().maxCoeff(), 0.0));  // the anchor's yaw is another matter
+    frame.speed = state_.imu.v_W.norm();
+    // As the vehicle sees it, without that of the heading.
+    frame.velocity_sigma = std::sqrt(covariance_.matrix().diagonal().segment<3>(err::nu).cwiseMax(0.0).maxCoeff());
     frame.horizontal_sigma = std::sqrt(variance.segment<2>(estimate_error::position).maxCoeff());
     frame.vertical_sigma = std::sqrt(variance(estimate_error::position + 2));
   }
@@ -537,7 +540,7 @@ bool Filter::try_start(TimeNs t_ns, const ImuStatistics& imu, bool still) {
   // What the force measures beyond gravity's known size can only be bias.
   const Eigen::Vector3d gravity_B = -(x.R_WB.transpose() * kGravity_W);
 
-  covariance_.reset(start_sigma());
+  reset_covariance(start_sigma());
   status_ = Status::tracking;
   turns_.clear();  // all before t_ns
   ranges_.clear();
@@ -567,7 +570,7 @@ bool Filter::try_rolling_start() {
   state_.imu = *start;
   Eigen::VectorXd sigma = start_sigma();
   sigma.segment<3>(err::nu).setConstant(kRollingVelocity * (1.0 + start->v_W.norm()));
-  covariance_.reset(sigma);
+  reset_covariance(sigma);
   status_ = Status::tracking;
   join_worlds();
   return true;
@@ -633,6 +636,15 @@ void Filter::join_worlds() {
   anchor_ = Anchor::join(last, predict_here(state_.imu.t_ns), std::sqrt(yaw_variance), position_sigma);
 }
 
+/// The accelerometer could tell the scale of the wheels, if its gain were known better than theirs. It is not: only
+/// their difference is learned, and ordinary_covariance counts what the scale may be off.
+void Filter::reset_covariance(const Eigen::VectorXd& sigma) {
+  covariance_.reset(sigma);
+  if (!scale_is_given()) return;
+  const Eigen::RowVector2d mean_is_known(0.5 / kKnownScale, 0.5 / kKnownScale);
+  covariance_.update(mean_is_known, err::wheel_radius, Eigen::Matrix<double, 1, 1>::Zero());
+}
+
 /// Standard deviations of the whole error vector before gravity and biases were measured.
 Eigen::VectorXd Filter::start_sigma() const {
   const OnlineCalibrationConfig& online = config_.online_calibration;
@@ -656,7 +668,9 @@ Eigen::VectorXd Filter::start_sigma() const {
     sigma.segment<2>(err::normal).setConstant(config_.odometer.normal_prior);
     if (online.wheels) sigma.segment<2>(err::wheel_radius).setConstant(prior.wheel_radius);
     if (online.wheels) sigma(err::wheel_separation) = prior.wheel_separation;
-    if (online.odometer_rotation) sigma.segment<3>(err::odometer).setConstant(prior.odometer_rotation);
+    if (online.odometer_rotation) {
+      sigma.segment<3>(err::odometer).setConstant(sees_ground() ? prior.odometer_rotation : prior.odometer_unseen);
+    }
     if (online.beam_tilt) sigma.segment(err::beams, beam_count_).setConstant(prior.beam_tilt);
   }
   return sigma;
@@ -748,7 +762,7 @@ void Filter::update_with_wheels(const WheelTurn& turn) {
   imu_.for_each_piece(turn.from_ns, turn.to_ns,
                       [&](const Eigen::Vector3d& gyro_B, const Eigen::Vector3d&, double d) { turned_B += gyro_B * d; });
   WheelRows rows =
-      linearize_wheels(state_, motion.R_WB, motion.v_W, turn, turned_B / dt, odometer.model, beam_count_ > 0);
+      linearize_wheels(state_, motion.R_WB, motion.v_W, turn, turned_B / dt, odometer.model, sees_ground());
 
   const double per_root_metre = std::sqrt(std::abs(rows.wheel_speed) / dt);
   const double yaw_rate = (turned_B / dt - state_.imu.b_g).norm();
@@ -756,20 +770,28 @@ void Filter::update_with_wheels(const WheelTurn& turn) {
   const double count_noise = std::sqrt(2.0) * calibration_.encoder->noise_counts * 2.0 * M_PI /
                              static_cast<double>(calibration_.encoder->resolution) / dt *
                              state_.odometer.wheel_radius.mean() / std::sqrt(2.0);
-  const auto root_sum = [&](int row, double a, double b, double c) {
+  // On springs and tyres the body does not point along its path, and no laser tells by how much.
+  const double sway = sees_ground() ? 0.0 : std::abs(rows.wheel_speed) / std::sqrt(dt);  // [m/s] per [rad sqrt(s)]
+  const auto root_sum = [&](int row, std::initializer_list<double> sigmas) {
+    double variance = 0.0;
+    for (const double s : sigmas) variance += s * s;
     const double gyro = gyro_noise * rows.J_gyro.row(row).norm();
-    return std::sqrt(a * a + b * b + c * c + gyro * gyro);
+    return std::sqrt(variance + gyro * gyro);
   };
+  const double floor = odometer.speed_sigma;
   Eigen::Vector4d sigma;
-  sigma << root_sum(WheelRows::speed, odometer.speed_sigma, odometer.slip * per_root_metre, count_noise),
-      root_sum(WheelRows::side, odometer.speed_sigma, odometer.side_slip * per_root_metre,
-               odometer.side_slip_turn * yaw_rate),
-      root_sum(WheelRows::slope, odometer.speed_sigma, odometer.roughness * per_root_metre, 0.0),
-      root_sum(WheelRows::yaw_rate, odometer.yaw_rate_sigma, count_noise * 2.0 / state_.odometer.wheel_separation, 0.0);
+  sigma << root_sum(WheelRows::speed, {floor, odometer.slip * per_root_metre, count_noise}),
+      root_sum(WheelRows::side, {floor, odometer.side_slip * per_root_metre, odometer.side_slip_turn * yaw_rate,
+                                 odometer.body_yaw * sway}),
+      root_sum(WheelRows::slope, {floor, odometer.roughness * per_root_metre, odometer.body_pitch * sway}),
+      root_sum(WheelRows::yaw_rate, {odometer.yaw_rate_sigma, count_noise * 2.0 / state_.odometer.wheel_separation});
   log_wheels(rows, sigma, turn.to_ns);
 
-  const bool use_yaw_rate = odometer.model == OdometerModel::differential || odometer.yaw_rate;
-  const bool slope_known = odometer.model != OdometerModel::terrain || beam_count_ == 0 || ground_known_;
+  // Without lasers, roll and the gyroscope's bias are told apart by nothing else: both turn the path sideways.
+  const bool terrain = odometer.model == OdometerModel::terrain;
+  const bool use_yaw_rate =
+      odometer.model == OdometerModel::differential || odometer.yaw_rate || (terrain && !sees_ground());
+  const bool slope_known = !terrain || !sees_ground() || ground_known_;
   const bool speed_known = choose_wheels(rows, sigma, turn);
   std::array<bool, WheelRows::size> use = {speed_known, true, slope_known, use_yaw_rate && wheel_agreement_.agree()};
   Eigen::Matrix<double, WheelRows::size, kGroundColumns> H;
@@ -1156,13 +1178,19 @@ NavState Filter::predict_here(TimeNs t_ns) const {
   return NavState{x.t_ns, Eigen::Quaterniond(x.R_WB).normalized(), x.p_WB, x.v_W, x.b_g, x.b_a};
 }
 
-/// From the invariant error to the ordinary one: dv = nu - [v]x theta, dp = rho - [p]x theta.
+/// From the invariant error to the ordinary one: dv = nu - [v]x theta, dp = rho - [p]x theta. Where the scale is given,
+/// with what it may be off: larger wheels make way and velocity longer alike.
 ImuErrorMatrix Filter::ordinary_covariance() const {
   const ImuState& x = state_.imu;
   ImuErrorMatrix T = ImuErrorMatrix::Identity();
   T.block<3, 3>(estimate_error::velocity, err::theta) = -skew(x.v_W);
   T.block<3, 3>(estimate_error::position, err::theta) = -skew(x.p_WB);
-  return T * covariance_.matrix().topLeftCorner<err::imu_size, err::imu_size>() * T.transpose();
+  ImuErrorMatrix P = T * covariance_.matrix().topLeftCorner<err::imu_size, err::imu_size>() * T.transpose();
+  if (!scale_is_given()) return P;
+  Eigen::Matrix<double, err::imu_size, 1> J = Eigen::Matrix<double, err::imu_size, 1>::Zero();
+  J.segment<3>(estimate_error::velocity) = x.v_W;
+  J.segment<3>(estimate_error::position) = x.p_WB;
+  return P + config_.prior.wheel_scale * config_.prior.wheel_scale * J * J.transpose();
 }
 
 Estimate Filter::make_estimate() const {

@@ -114,6 +114,7 @@ class Filter {
   void join_worlds();
   void stop();
   [[nodiscard]] Eigen::VectorXd start_sigma() const;
+  void reset_covariance(const Eigen::VectorXd& sigma);
   bool begin_frame(const FeatureFrame& frame);
   void compare_sensors(const FeatureFrame& frame, TimeNs t_ns);
   [[nodiscard]] Displacement displacement_by_wheels(TimeNs until_ns) const;
@@ -132,6 +133,11 @@ class Filter {
   void log_features();
   void note_contact(ContactEvent event);
   [[nodiscard]] bool on_ground() const { return encoder_ && contact_.mode() == ContactMode::ground; }
+  [[nodiscard]] bool sees_ground() const { return beam_count_ > 0; }  ///< are there lasers?
+  /// Nothing but the wheels' calibration tells a length: there is neither camera nor laser.
+  [[nodiscard]] bool scale_is_given() const {
+    return encoder_ && config_.online_calibration.wheels && !sees_ground() && calibration_.cameras.empty();
+  }
   [[nodiscard]] bool rolls_at(TimeNs t_ns) const;
   static bool agrees_again(TimeNs& since_ns, bool passes, TimeNs t_ns);
   void update_with_wheels(const WheelTurn& turn);

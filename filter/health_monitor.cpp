@@ -31,7 +31,8 @@ constexpr double kStampOff = 0.06;     // [s] off the usual
 constexpr double kStampSpreads = 6.0;
 constexpr double kStampMemory = 1000.0;  // stamps
 constexpr double kUnaided = 2.0;         // [s] that inertia alone may carry the estimate
-constexpr double kWorstVelocity = 1.0;   // [m/s] standard deviation of a velocity that is known
+constexpr double kWorstVelocity = 1.0;   // [m/s] standard deviation of a velocity that is known,
+constexpr double kWorstDirection = 0.2;  // [rad] or of its direction, if more: one that is fast need not know it better
 constexpr double kContradicted = 1.0;    // [s]
 
 }  // namespace
@@ -257,8 +258,12 @@ void HealthMonitor::judge_turn(const Frame& frame) {
       known && turn_rate_.norm() > std::max(kTurnOff, kTurnSigmas * std::sqrt(0.5 * share * turn_scatter_));
 }
 
+bool HealthMonitor::velocity_known() const {
+  return last_.velocity_sigma < std::max(kWorstVelocity, kWorstDirection * last_.speed);
+}
+
 void HealthMonitor::decide(TimeNs t_ns) {
-  if (!started_ && last_.running && last_.velocity_sigma < kWorstVelocity) {
+  if (!started_ && last_.running && velocity_known()) {
     started_ = true;
     aided_ns_ = fitting_ns_ = t_ns;
   }
@@ -285,7 +290,7 @@ void HealthMonitor::decide(TimeNs t_ns) {
     health_.onset_ns[source] = trust_[source].onset_ns();
   }
   const bool usable = last_.running && last_.possible && seconds_between(aided_ns_, t_ns) < kUnaided &&
-                      last_.velocity_sigma < kWorstVelocity && !contradicted_;
+                      velocity_known() && !contradicted_;
   const HealthStatus status = !started_                 ? HealthStatus::initialising
                               : !usable                 ? HealthStatus::lost
                               : health_.untrusted.any() ? HealthStatus::degraded

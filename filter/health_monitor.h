@@ -79,7 +79,8 @@ class HealthMonitor {
     bool lifted = false;   ///< the vehicle just left the ground or met it, whatever is known of its contact
     FrameAgreement agreement;
     FrameStatistics statistics;
-    double velocity_sigma = 0.0;    ///< [m/s] worst axis
+    double speed = 0.0;             ///< [m/s]
+    double velocity_sigma = 0.0;    ///< [m/s] worst axis, seen from the vehicle
     double horizontal_sigma = 0.0;  ///< [m]
     double vertical_sigma = 0.0;    ///< [m]
   };
@@ -98,6 +99,7 @@ class HealthMonitor {
   void decide(TimeNs t_ns);
   [[nodiscard]] Trust& trust(Source source) { return trust_[index_of(source)]; }
   [[nodiscard]] bool trusted(Source source) const { return trust_[index_of(source)].trusted(); }
+  [[nodiscard]] bool velocity_known() const;
   [[nodiscard]] int quality(const Frame& frame) const;
   void accuse(std::initializer_list<Source> sources, TimeNs t_ns);
 

@@ -29,8 +29,10 @@ struct PriorConfig {
   double stereo_position = 1e-4;    ///< [m]
   double time_offset = 1e-3;        ///< [s] camera against IMU
   double wheel_radius = 5e-3;       ///< of each wheel, relative
+  double wheel_scale = 1e-2;        ///< of both wheels alike, relative, where neither camera nor lasers exist
   double wheel_separation = 5e-3;   ///< relative
   double odometer_rotation = 5e-3;  ///< [rad] odometer in the body
+  double odometer_unseen = 5e-2;    ///< [rad] the same without lasers, where it is what was guessed
   double beam_tilt = 5e-3;          ///< [rad] each laser beam
 };
 
@@ -61,11 +63,13 @@ enum class OdometerUpdate : std::uint8_t {
 struct OdometerConfig {
   OdometerModel model = OdometerModel::terrain;
   OdometerUpdate update = OdometerUpdate::velocity;  ///< displacement: with the terrain model only
-  bool yaw_rate = false;         ///< use the difference of the wheels with OdometerModel::terrain too
-  double slip = 1e-3;            ///< along the track [m/sqrt(m)]
-  double side_slip = 2e-3;       ///< across it [m/sqrt(m)]
+  bool yaw_rate = false;    ///< the difference of the wheels with OdometerModel::terrain too; always without lasers
+  double slip = 1e-3;       ///< along the track [m/sqrt(m)]
+  double side_slip = 2e-3;  ///< across it [m/sqrt(m)]
   double side_slip_turn = 5e-3;  ///< across it, while turning [m/s per rad/s]
   double roughness = 4e-3;       ///< through the ground [m/sqrt(m)]
+  double body_pitch = 1e-2;      ///< without lasers: the body against its path, up and down [rad sqrt(s)]
+  double body_yaw = 2.5e-3;      ///< the same to the sides [rad sqrt(s)]
   double speed_sigma = 1e-3;     ///< [m/s] every row, also of standing wheels
   double yaw_rate_sigma = 0.02;  ///< [rad/s]
   double normal_walk = 0.1;      ///< how the ground's normal turns [rad/sqrt(m)]

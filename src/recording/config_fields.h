@@ -65,8 +65,10 @@ EnableFor<C, PriorConfig> visit(C& c, F&& f) {
   f("stereo_position", c.stereo_position);
   f("time_offset", c.time_offset);
   f("wheel_radius", c.wheel_radius);
+  f("wheel_scale", c.wheel_scale);
   f("wheel_separation", c.wheel_separation);
   f("odometer_rotation", c.odometer_rotation);
+  f("odometer_unseen", c.odometer_unseen);
   f("beam_tilt", c.beam_tilt);
 }
 
@@ -102,6 +104,8 @@ EnableFor<C, OdometerConfig> visit(C& c, F&& f) {
   f("side_slip", c.side_slip);
   f("side_slip_turn", c.side_slip_turn);
   f("roughness", c.roughness);
+  f("body_pitch", c.body_pitch);
+  f("body_yaw", c.body_yaw);
   f("speed_sigma", c.speed_sigma);
   f("yaw_rate_sigma", c.yaw_rate_sigma);
   f("normal_walk", c.normal_walk);

@@ -225,6 +225,12 @@ TEST_CASE("health: what is not a number, or a velocity that may be anything, is 
   drive.frame.possible = true;
   drive.go_on(0.1);
   CHECK(drive.health().status == HealthStatus::tracking);
+  drive.frame.velocity_sigma = 1.5;
+  drive.go_on(0.05);
+  CHECK(drive.health().status == HealthStatus::lost);
+  drive.frame.speed = 20.0;  // the same of a fast one: its direction is known to 0.075 rad
+  drive.go_on(0.1);
+  CHECK(drive.health().status == HealthStatus::tracking);
   drive.frame.velocity_sigma = std::numeric_limits<double>::infinity();
   drive.go_on(0.05);
   CHECK(drive.health().status == HealthStatus::lost);
