@@ -1203,11 +1203,8 @@ Estimate Filter::make_estimate() const {
   estimate.consistency = consistency_;
   if (ground_known_) {
     const Slope ground = slope(x.R_WB * state_.odometer.T_BO.R.col(1), state_.ground.n_W);
-    constexpr std::array<int, 5> kEntries = {err::theta, err::theta + 1, err::theta + 2, err::normal, err::normal + 1};
-    Eigen::Matrix<double, 5, 5> P;
-    for (int i = 0; i < 5; ++i) {
-      for (int j = 0; j < 5; ++j) P(i, j) = covariance_.matrix()(kEntries[i], kEntries[j]);
-    }
+    const std::array<int, 5> entries = {err::theta, err::theta + 1, err::theta + 2, err::normal, err::normal + 1};
+    const Eigen::Matrix<double, 5, 5> P = covariance_.matrix()(entries, entries);
     const Eigen::Matrix2d P_slope = ground.J * P * ground.J.transpose();
     estimate.terrain = {true, ground.along, ground.across, std::sqrt(P_slope(0, 0)), std::sqrt(P_slope(1, 1))};
   }

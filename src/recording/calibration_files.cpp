@@ -12,6 +12,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr int kMostPixels = 65536;  // along one side of an image
+
 std::optional<LensModel> lens_model(const std::string& name) {
   constexpr std::array kRadialTangential{"radial-tangential", "radial_tangential", "radtan", "plumb_bob", "none"};
   constexpr std::array kEquidistant{"equidistant", "equi", "kannala_brandt", "kannala_brandt4", "fisheye"};
@@ -31,6 +33,13 @@ std::array<double, 4> distortion_coefficients(const YamlMap& map, const std::str
   return {values[0], values[1], values[2], values[3]};
 }
 
+int pixels(const YamlMap& map, double number) {
+  if (number != std::floor(number) || number < 1.0 || number > kMostPixels) {
+    throw map.error("resolution", "two whole numbers from 1 to " + std::to_string(kMostPixels) + " expected");
+  }
+  return static_cast<int>(number);
+}
+
 // What EuRoC's sensor.yaml and Kalibr's camchain have in common; they differ in the key of the coefficients.
 CameraCalibration read_lens(const YamlMap& map, const std::string& coefficients_key) {
   const auto camera_model = map.get_or<std::string>("camera_model", "pinhole");
@@ -43,8 +52,8 @@ CameraCalibration read_lens(const YamlMap& map, const std::string& coefficients_
 
   CameraCalibration camera;
   const std::vector<double> resolution = map.numbers("resolution", 2);
-  camera.width = static_cast<int>(resolution[0]);
-  camera.height = static_cast<int>(resolution[1]);
+  camera.width = pixels(map, resolution[0]);
+  camera.height = pixels(map, resolution[1]);
   const std::vector<double> intrinsics = map.numbers("intrinsics", 4);
   camera.fu = intrinsics[0];
   camera.fv = intrinsics[1];

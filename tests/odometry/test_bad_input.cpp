@@ -21,14 +21,14 @@ constexpr TimeNs kMin = std::numeric_limits<TimeNs>::min();
 constexpr TimeNs kHour = 3'600'000'000'000;
 
 const simulator::Simulation& drive() {
-  static const simulator::Simulation simulation = [] {
+  static const simulator::Simulation kSimulation = [] {
     simulator::Options options;
     options.sequence = "flat1";
     options.seed = 8102;
     options.duration = 14.0;
     return simulator::Simulation(options);
   }();
-  return simulation;
+  return kSimulation;
 }
 
 struct Outcome {

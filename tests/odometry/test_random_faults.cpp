@@ -43,25 +43,25 @@ class Chance {
 };
 
 double absurd(Chance& chance) {
-  static const std::vector<double> values{std::numeric_limits<double>::quiet_NaN(),
-                                          std::numeric_limits<double>::infinity(),
-                                          -std::numeric_limits<double>::infinity(),
-                                          std::numeric_limits<double>::max(),
-                                          std::numeric_limits<double>::denorm_min(),
-                                          1e12,
-                                          -1e6,
-                                          900.0,
-                                          -90.0,
-                                          9.0,
-                                          0.0};
-  return chance.pick(values);
+  static const std::vector<double> kValues{std::numeric_limits<double>::quiet_NaN(),
+                                           std::numeric_limits<double>::infinity(),
+                                           -std::numeric_limits<double>::infinity(),
+                                           std::numeric_limits<double>::max(),
+                                           std::numeric_limits<double>::denorm_min(),
+                                           1e12,
+                                           -1e6,
+                                           900.0,
+                                           -90.0,
+                                           9.0,
+                                           0.0};
+  return chance.pick(kValues);
 }
 
 /// A stamp that is off by anything from a microsecond to three centuries.
 TimeNs false_stamp(TimeNs t_ns, Chance& chance) {
-  static const std::vector<TimeNs> extremes{std::numeric_limits<TimeNs>::max(), std::numeric_limits<TimeNs>::min(), 0,
-                                            -1};
-  if (chance.happens(0.1)) return chance.pick(extremes);
+  static const std::vector<TimeNs> kExtremes{std::numeric_limits<TimeNs>::max(), std::numeric_limits<TimeNs>::min(), 0,
+                                             -1};
+  if (chance.happens(0.1)) return chance.pick(kExtremes);
   const double size = std::pow(10.0, chance.uniform(3.0, 18.0));
   return t_ns + static_cast<TimeNs>(chance.happens(0.5) ? size : -size);
 }
@@ -72,9 +72,9 @@ void spoil(ImuSample& s, Chance& chance) {
 }
 
 void spoil(EncoderSample& s, Chance& chance) {
-  static const std::vector<std::int64_t> counts{std::numeric_limits<std::int64_t>::max(),
-                                                std::numeric_limits<std::int64_t>::min(), 0, 1 << 20, -4096};
-  (chance.happens(0.5) ? s.left_count : s.right_count) = chance.pick(counts);
+  static const std::vector<std::int64_t> kCounts{std::numeric_limits<std::int64_t>::max(),
+                                                 std::numeric_limits<std::int64_t>::min(), 0, 1 << 20, -4096};
+  (chance.happens(0.5) ? s.left_count : s.right_count) = chance.pick(kCounts);
 }
 
 void spoil(LaserSample& s, Chance& chance) {
@@ -156,22 +156,22 @@ class Trouble {
 };
 
 simulator::Simulation simulate(std::uint64_t seed, Chance& chance) {
-  static const std::vector<std::string> sequences{"flat1", "flat3", "wave1", "fly1", "sway1", "occlusion1"};
-  static const std::vector<std::string> faults{"encoder_frozen",     "encoder_frozen.left", "wheel_slipping",
-                                               "wheel_idle_spin",    "wheel_lifted",        "laser_stuck",
-                                               "laser_biased.rear",  "laser_no_return.all", "people",
-                                               "camera_covered",     "camera_covered.left", "camera_dark.right",
-                                               "camera_overexposed", "camera_frozen",       "camera_swapped",
-                                               "camera_dropped",     "camera_late",         "imu_spikes",
-                                               "imu_saturated",      "imu_bias_jump",       "imu_gap",
-                                               "clock_jump.all",     "clock_jump.imu",      "clock_jump.camera",
-                                               "clock_jump.encoder"};
+  static const std::vector<std::string> kSequences{"flat1", "flat3", "wave1", "fly1", "sway1", "occlusion1"};
+  static const std::vector<std::string> kFaults{"encoder_frozen",     "encoder_frozen.left", "wheel_slipping",
+                                                "wheel_idle_spin",    "wheel_lifted",        "laser_stuck",
+                                                "laser_biased.rear",  "laser_no_return.all", "people",
+                                                "camera_covered",     "camera_covered.left", "camera_dark.right",
+                                                "camera_overexposed", "camera_frozen",       "camera_swapped",
+                                                "camera_dropped",     "camera_late",         "imu_spikes",
+                                                "imu_saturated",      "imu_bias_jump",       "imu_gap",
+                                                "clock_jump.all",     "clock_jump.imu",      "clock_jump.camera",
+                                                "clock_jump.encoder"};
   simulator::Options options;
-  options.sequence = chance.pick(sequences);
+  options.sequence = chance.pick(kSequences);
   options.seed = seed;
   options.duration = kDuration;
   for (std::size_t n = 1 + chance.below(4); n > 0; --n) {
-    std::string name = chance.pick(faults);
+    std::string name = chance.pick(kFaults);
     const bool clock = name.rfind("clock_jump", 0) == 0;
     name += '@' + std::to_string(chance.uniform(0.5, 30.0)) + '+' + std::to_string(chance.uniform(0.1, 9.0));
     if (clock) name += '=' + std::to_string(std::pow(10.0, chance.uniform(-2.0, 2.0)) * (chance.happens(0.5) ? 1 : -1));

@@ -146,6 +146,14 @@ TEST_CASE("calibration: errors name file, line and key") {
     replace_in(camera, "10.25", ".nan");
     CHECK(contains(error(), "cam0/sensor.yaml:14: intrinsics: '.nan' is not a finite number"));
   }
+  SUBCASE("an image of a size that none has") {
+    std::string size = "16, 12";
+    for (const char* next : {"16, 4.8e72", "-16, 12", "16, 12.5", "0, 12"}) {
+      replace_in(camera, size, next);
+      size = next;
+      CHECK(contains(error(), "resolution: two whole numbers from 1 to 65536 expected"));
+    }
+  }
   SUBCASE("too few numbers") {
     replace_in(camera, "16, 12", "16");
     CHECK(contains(error(), "cam0/sensor.yaml:12: resolution: 1 numbers, not 2"));
