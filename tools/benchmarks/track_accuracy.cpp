@@ -4,23 +4,20 @@
 //
 // One row of a Markdown table per sequence, camera rate, calibration and configuration file, over all seeds.
 #include <CLI/CLI.hpp>
-#include <atomic>
 #include <cstdlib>
-#include <exception>
 #include <filesystem>
-#include <functional>
 #include <iostream>
 #include <map>
 #include <mutex>
 #include <optional>
-#include <stdexcept>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "src/recording/config_fields.h"
 #include "src/recording/config_file.h"
 #include "tools/evaluation/alignment.h"
+#include "tools/experiments/in_parallel.h"
+#include "tools/experiments/seeds.h"
 #include "tools/experiments/table.h"
 #include "tools/progress.h"
 #include "tools/simulator/faults.h"
@@ -53,25 +50,6 @@ struct Variant {
   std::string settings;
   FilterConfig config;
 };
-
-std::uint64_t parse_seed(const std::string& text) {
-  if (text.empty() || text.find_first_not_of("0123456789") != std::string::npos) {
-    throw std::invalid_argument("--seeds: '" + text + "' is no seed: a number, or two as in 501..505");
-  }
-  return std::stoull(text);
-}
-
-/// "501..505", "7" -> the numbers.
-std::vector<std::uint64_t> parse_seeds(const std::vector<std::string>& texts) {
-  std::vector<std::uint64_t> seeds;
-  for (const std::string& text : texts) {
-    const std::size_t dots = text.find("..");
-    const std::uint64_t first = parse_seed(text.substr(0, dots));
-    const std::uint64_t last = dots == std::string::npos ? first : parse_seed(text.substr(dots + 2));
-    for (std::uint64_t seed = first; seed <= last; ++seed) seeds.push_back(seed);
-  }
-  return seeds;
-}
 
 std::vector<simulator::Options> simulations_of(const Arguments& args) {
   const bool all = args.sequences == std::vector<std::string>{"all"};
@@ -136,26 +114,6 @@ std::vector<Run> run(const simulator::Options& options, const std::vector<Varian
     runs.push_back({setup, options.seed, measure(simulation, told, variant.config, args.alignment)});
   }
   return runs;
-}
-
-/// Runs work(0) .. work(count - 1) on several threads; the first exception ends it and is thrown.
-void in_parallel(std::size_t count, int threads, const std::function<void(std::size_t)>& work) {
-  std::atomic<std::size_t> next{0};
-  std::mutex mutex;
-  std::exception_ptr failure;
-  const auto loop = [&] {
-    try {
-      for (std::size_t i = next++; i < count; i = next++) work(i);
-    } catch (...) {
-      const std::lock_guard<std::mutex> lock(mutex);
-      if (!failure) failure = std::current_exception();
-      next = count;
-    }
-  };
-  std::vector<std::thread> pool;
-  for (int i = 0; i < threads; ++i) pool.emplace_back(loop);
-  for (std::thread& thread : pool) thread.join();
-  if (failure) std::rethrow_exception(failure);
 }
 
 void track_accuracy(const Arguments& args) {

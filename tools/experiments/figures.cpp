@@ -86,12 +86,15 @@ void take_errors(const evaluation::Evaluation& evaluation, Figures& figures) {
 }  // namespace
 
 Figures measure(const simulator::Simulation& simulation, const Calibration& calibration, const FilterConfig& config,
-                evaluation::AlignmentKind alignment) {
+                evaluation::AlignmentKind alignment, const OnHealth& on_health) {
   Filter filter(config, calibration);
   Record record;
   ReplayOptions options;
   options.camera = !calibration.cameras.empty();
   options.wheels = calibration.encoder && config.odometer.model != OdometerModel::none;
+  if (on_health) {
+    options.after = [&](const simulator::Delivery& delivery) { on_health(delivery.arrival_ns, filter.health()); };
+  }
   replay(
       simulation, filter, [&](TimeNs, const Estimate& estimate) { record.add(estimate); }, options);
   if (config.odometer.model == OdometerModel::none) record.estimate.terrain.clear();  // it was not asked

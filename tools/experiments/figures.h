@@ -1,10 +1,12 @@
 // One run of the filter on one simulation, and its figures.
 #pragma once
 
+#include <functional>
 #include <optional>
 
 #include "ear/calibration.h"
 #include "ear/filter_config.h"
+#include "ear/health.h"
 #include "tools/evaluation/evaluate.h"
 #include "tools/simulator/simulation.h"
 
@@ -35,9 +37,14 @@ struct Figures {
   std::optional<double> beams_rejected;       ///< share of the laser ranges [%]
 };
 
+/// The time is when the sample arrived.
+using OnHealth = std::function<void(TimeNs arrival_ns, const Health& health)>;
+
 /// Runs a new filter that is told `calibration`; without cameras in it, without images. A run whose estimate stops
-/// being finite keeps only its coverage.
+/// being finite keeps only its coverage. `on_health`, if given, is told what the health is after every sample and
+/// frame.
 [[nodiscard]] Figures measure(const simulator::Simulation& simulation, const Calibration& calibration,
-                              const FilterConfig& config, evaluation::AlignmentKind alignment);
+                              const FilterConfig& config, evaluation::AlignmentKind alignment,
+                              const OnHealth& on_health = {});
 
 }  // namespace ear::experiments
