@@ -50,8 +50,9 @@ void Covariance::restart(int first, const Eigen::Ref<const Eigen::VectorXd>& sig
   P_.diagonal().segment(first, count) = sigma.cwiseAbs2();
 }
 
-void Covariance::widen(int first, const Eigen::Ref<const Eigen::VectorXd>& sigma) {
-  P_.diagonal().segment(first, sigma.size()) += sigma.cwiseAbs2();
+void Covariance::widen(int first, const Eigen::Ref<const Eigen::MatrixXd>& Q) {
+  assert(first >= 0 && Q.rows() == Q.cols() && first + Q.rows() <= size_);
+  P_.block(first, first, Q.rows(), Q.cols()) += Q;
 }
 
 double Covariance::variance(const Eigen::Ref<const Eigen::RowVectorXd>& h, int first_column) const {

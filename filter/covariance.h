@@ -27,8 +27,8 @@ class Covariance {
   /// Makes the `sigma.size()` entries from `first` on unknown anew: these standard deviations, no correlations.
   void restart(int first, const Eigen::Ref<const Eigen::VectorXd>& sigma);
 
-  /// Adds an independent error of these standard deviations to the `sigma.size()` entries from `first` on.
-  void widen(int first, const Eigen::Ref<const Eigen::VectorXd>& sigma);
+  /// Adds an independent error of covariance Q to the Q.rows() entries from `first` on.
+  void widen(int first, const Eigen::Ref<const Eigen::MatrixXd>& Q);
 
   /// Variance of the row h of the entries from `first_column` on.
   [[nodiscard]] double variance(const Eigen::Ref<const Eigen::RowVectorXd>& h, int first_column) const;

@@ -23,11 +23,8 @@ bool integrate_turns(const TurnsBetween& turns, const ImuBuffer& samples, TimeNs
     if (turn.from_ns > now_ns + kMissedReading || (last && to_ns > turn.to_ns + kMissedReading)) return false;
     const TimeNs end_ns = last ? to_ns : std::min(to_ns, turn.to_ns);
     const double dt = seconds_between(now_ns, end_ns);
-    Eigen::Vector3d turned_B = Eigen::Vector3d::Zero();
-    samples.for_each_piece(now_ns, end_ns, [&](const Eigen::Vector3d& gyro_B, const Eigen::Vector3d&, double d) {
-      turned_B += gyro_B * d;
-    });
-    wheels.add_interval(turned_B / dt, dt, turn.angle * (dt / turn.duration()));
+    const MeanRate rate = samples.mean_rate(now_ns, end_ns);
+    wheels.add_interval(rate.gyro_B, dt, turn.angle * (dt / turn.duration()), rate.noise_factor);
     now_ns = end_ns;
   }
   return now_ns >= to_ns;
@@ -38,8 +35,7 @@ bool integrate_turns(const TurnsBetween& turns, const ImuBuffer& samples, TimeNs
 /// Position errors follow from R = Exp(theta) R^, v = Exp(theta) v^ + nu at i, where
 ///   p_BiBj = R^T (v T + g T^2 / 2) + what the IMU measures:
 /// the velocity in the body moves by R^^T nu, gravity by R^^T [g]x theta; biases act through the samples.
-ImuMotion imu_motion(const ImuState& x, const ImuBuffer& samples, TimeNs to_ns, const ImuCalibration& noise,
-                     ImpactGuard guard) {
+ImuMotion imu_motion(const ImuState& x, const ImuBuffer& samples, TimeNs to_ns, const ImuCalibration& noise) {
   ImuState body = x;  // from B_i on, without gravity and velocity
   body.R_WB.setIdentity();
   body.v_W.setZero();
@@ -48,7 +44,8 @@ ImuMotion imu_motion(const ImuState& x, const ImuBuffer& samples, TimeNs to_ns, 
   Eigen::Matrix3d xi_bg = Eigen::Matrix3d::Zero(), v_bg = Eigen::Matrix3d::Zero(), p_bg = Eigen::Matrix3d::Zero();
   double v_variance = 0.0, pv_covariance = 0.0;  // noise is alike in all directions: rotations leave it as it is
   ImuMotion motion;
-  const auto add = [&](const Eigen::Vector3d& gyro_B, const Eigen::Vector3d& accel_B, double dt) {
+  const auto add = [&](const Eigen::Vector3d& gyro_B, const Eigen::Vector3d& accel_B, double dt,
+                       const ImuNoiseFactors& factors) {
     const Eigen::Vector3d phi = (gyro_B - x.b_g) * dt;
     const Eigen::Vector3d f_B = accel_B - x.b_a;
     const Eigen::Matrix3d R_G1 = body.R_WB * gamma<1>(phi);
@@ -62,7 +59,6 @@ ImuMotion imu_motion(const ImuState& x, const ImuBuffer& samples, TimeNs to_ns, 
     p_ba += v_ba * dt - R_G2 * (dt * dt);
     v_ba -= R_G1 * dt;
 
-    const ImuNoiseFactors factors = guard.add({x.t_ns + static_cast<TimeNs>(1e9 * motion.duration), gyro_B, accel_B});
     const double accel = squared(noise.accel_noise * factors.accel);
     motion.position_variance += (2.0 * pv_covariance + (v_variance + accel * dt / 3.0) * dt) * dt;
     pv_covariance += (v_variance + 0.5 * accel * dt) * dt;

@@ -8,7 +8,6 @@
 #include "ear/calibration.h"
 #include "filter/consistency.h"
 #include "filter/covariance.h"
-#include "filter/impact_guard.h"
 #include "filter/imu_buffer.h"
 #include "filter/ring.h"
 #include "filter/state.h"
@@ -27,9 +26,9 @@ struct ImuMotion {
   double rotation_variance = 0.0;  ///< of each axis, by the gyroscope's [rad^2]
 };
 
-/// Integrates the samples from x.t_ns to `to_ns`. `guard`, a copy of the filter's, tells of strikes among them.
+/// Integrates the samples from x.t_ns to `to_ns`.
 [[nodiscard]] ImuMotion imu_motion(const ImuState& x, const ImuBuffer& samples, TimeNs to_ns,
-                                   const ImuCalibration& noise, ImpactGuard guard);
+                                   const ImuCalibration& noise);
 
 /// `P`: covariance of the error at i.
 [[nodiscard]] Displacement imu_displacement(const ImuMotion& motion, const Covariance& P);

@@ -10,6 +10,7 @@
 #include "filter/displacement_update.h"
 #include "filter/displacements.h"
 #include "filter/ground.h"
+#include "filter/relative_motion.h"
 #include "filter/rolling_start.h"
 
 namespace ear {
@@ -34,6 +35,13 @@ constexpr double kGravityTolerance = 1.5;      // [m/s^2] of the specific force 
 constexpr double kWheelAge = 0.1;              // [s] older readings do not tell whether the wheels rest
 constexpr double kHeldSample = 0.04;           // [s] so far the newest IMU sample may stand in for one that is missing
 constexpr double kGapNoiseFactor = 10.0;       // on the noise densities while a gap in the IMU data is bridged
+constexpr double kHoleAccel = 1.0;             // [m/s^2] while nothing was measured
+constexpr double kDoubtfulTurn = 5e-3;         // [rad] standard deviation of what one inertial sample adds
+constexpr double kBridgeRotation = 2e-3;       // [rad] standard deviations with which two images tell of the motion:
+constexpr double kBridgePosition = 5e-3;       // [m] well above what the features will tell later
+constexpr double kImageSoon = 0.25;            // [s] after the last one
+constexpr double kBiasDelay = 0.3;             // [s] until a bias that jumped is found out
+constexpr std::size_t kFewestRepeated = 8;     // features, for two images to be the same
 constexpr double kStartGravityNoise = 0.02;    // [m/s^2] what idling rotors leave in the mean specific force
 constexpr double kKnownSigma = 1e-6;           // [m, rad] of position and yaw at the start: by definition zero
 constexpr double kKnownScale = 1e-6;           // of the wheels where nothing can tell it
@@ -177,12 +185,17 @@ void Filter::add_imu(const ImuSample& sample) {
   }
   if (verdict.begins_anew) restart(sample.t_ns, verdict.clock_shift);
   monitor_.add_imu(sample, config_.max_imu_gap);
+  if (!imu_.empty() && verdict.unseen > config_.max_imu_gap) {
+    imu_hole_ = ImuHole{imu_.newest().t_ns, sample.t_ns, verdict.unseen};
+  }
   // Without frames for long, the state moves on before its samples are overwritten.
   if (status_ == Status::tracking && imu_.size() == kImuCapacity && state_.imu.t_ns < imu_[kImuCapacity / 2].t_ns) {
     advance(imu_[kImuCapacity / 2].t_ns);
   }
   mend_spike(sample);
-  imu_.push(sample);
+  const ImuNoiseFactors noise = impact_guard_.add(sample);
+  imu_.doubt_newest(static_cast<std::size_t>(impact_guard_.clipped_before()), noise);
+  imu_.push(sample, noise);
   if (encoder_) note_contact(contact_.add_imu(sample));
 }
 
@@ -224,8 +237,18 @@ void Filter::note_contact(ContactEvent event) {
   if (event == ContactEvent::none) return;
   ground_known_ = false;
   if (event != ContactEvent::takeoff || status_ != Status::tracking) return;
-  covariance_.widen(err::nu, Eigen::Vector3d::Constant(kTakeoffVelocity));
-  covariance_.widen(err::rho, Eigen::Vector3d::Constant(kTakeoffPosition));
+  doubt_motion(0.0, kTakeoffVelocity, kTakeoffPosition);
+}
+
+/// The vehicle may be turned, faster and elsewhere by these standard deviations [rad, m/s, m], each way, whatever was
+/// measured so far. A turn is about the body: by the invariant error, nu = dv + [v]x theta, rho = dp + [p]x theta.
+void Filter::doubt_motion(double rotation, double velocity, double position) {
+  Eigen::Matrix<double, 9, 3> J;
+  J << Eigen::Matrix3d::Identity(), skew(state_.imu.v_W), skew(state_.imu.p_WB);
+  Eigen::Matrix<double, 9, 9> Q = rotation * rotation * J * J.transpose();
+  Q.diagonal().segment<3>(err::nu).array() += velocity * velocity;
+  Q.diagonal().segment<3>(err::rho).array() += position * position;
+  covariance_.widen(err::theta, Q);
 }
 
 /// Do the wheels tell how the vehicle moves? Not in the air, and not while they are spun up by the ground.
@@ -303,16 +326,79 @@ std::optional<Estimate> Filter::process(const FeatureFrame& given) {
     return std::nullopt;
   }
   const FeatureFrame& frame = guard_.sound(given);
-  const bool still = begin_frame(frame);
+  const bool frozen = repeats_last_image(frame);
+  FeatureFrame nothing;
+  nothing.t_ns = frame.t_ns;
+  const bool still = begin_frame(frozen ? nothing : frame);
   FrameAgreement agreement;
-  if (status_ == Status::tracking) {
+  agreement.frozen = frozen;
+  if (status_ == Status::tracking && !frozen) {
+    bridge(frame);
     agreement = check_frame(frame);
-    use_image(frame, still);
   }
-  any_image_ = true;
-  last_image_ns_ = frame.t_ns;
-  last_features_ = frame;
+  const bool usable = monitor_.check_image(agreement, imu_time(frame.t_ns), imu_.newest().t_ns);
+  if (status_ == Status::tracking) {
+    if (usable) {
+      use_image(frame, still);
+    } else {
+      go_on_blind(still);
+    }
+  }
+  if (status_ == Status::tracking) watch_biases(seconds_between(watched_ns_, state_.imu.t_ns));
+  watched_ns_ = state_.imu.t_ns;
+  if (usable) {
+    any_image_ = true;
+    last_image_ns_ = frame.t_ns;
+    last_features_ = frame;
+    image_T_WB_ = {state_.imu.R_WB, state_.imu.p_WB};
+  }
   return finish_frame(true, agreement);
+}
+
+/// No two exposures are exactly equal.
+bool Filter::repeats_last_image(const FeatureFrame& frame) const {
+  if (!any_image_ || frame.features.size() < kFewestRepeated) return false;
+  const std::vector<FeatureObservation>& last = last_features_.features;
+  std::size_t common = 0;
+  std::size_t equal = 0;
+  for (std::size_t i = 0; i < std::min(frame.features.size(), last.size()); ++i) {
+    if (frame.features[i].id != last[i].id) continue;
+    ++common;
+    equal += frame.features[i].left == last[i].left ? 1 : 0;
+  }
+  return common >= kFewestRepeated && equal == common;
+}
+
+/// Where the inertial samples since the last image may be wrong by more than noise (clipped, missing, stamps that
+/// jumped), the two images tell how the body moved, roughly: later, the features of both will tell it in full, around a
+/// state that is near enough to be linear. docs/filter.md, section 14.
+void Filter::bridge(const FeatureFrame& frame) {
+  const bool needed = imu_doubtful_;
+  imu_doubtful_ = false;
+  if (!needed || !any_image_ || calibration_.cameras.size() < 2 || state_.clones.empty()) return;
+  match_stereo(last_features_, frame, bridge_matches_);
+  StereoMotion start;
+  start.R_B0B1 = image_T_WB_.R.transpose() * state_.imu.R_WB;
+  start.p_B0B1 = image_T_WB_.R.transpose() * (state_.imu.p_WB - image_T_WB_.p);
+  const std::optional<StereoMotion> motion =
+      stereo_motion(bridge_matches_, state_.camera, start, config_.feature_sigma_px / focal_px_);
+  if (!motion) return;
+  const int newest = static_cast<int>(state_.clones.size()) - 1;
+  const RelativeMotionRows rows = linearize_relative_motion(state_, newest, {motion->R_B0B1, motion->p_B0B1});
+  const Eigen::Matrix3d R_WB0 = state_.clones.back().T_WB.R;
+  const Eigen::Matrix3d covariance =
+      R_WB0 * motion->covariance * R_WB0.transpose() + kBridgePosition * kBridgePosition * Eigen::Matrix3d::Identity();
+  const Eigen::LLT<Eigen::Matrix3d> llt(covariance);
+  const int clone = err::clone(newest);
+  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(6, clone + err::clone_size);
+  H.topLeftCorner<3, err::imu_size>() = rows.H.topRows<3>() / kBridgeRotation;
+  H.topRightCorner<3, err::clone_size>() = rows.H_clone.topRows<3>() / kBridgeRotation;
+  H.bottomLeftCorner<3, err::imu_size>() = llt.matrixL().solve(rows.H.bottomRows<3>());
+  H.bottomRightCorner<3, err::clone_size>() = llt.matrixL().solve(rows.H_clone.bottomRows<3>());
+  Eigen::Matrix<double, 6, 1> r;
+  r << rows.residual.head<3>() / kBridgeRotation, llt.matrixL().solve(rows.residual.tail<3>());
+  learn_calibration_ = false;
+  update(H, 0, r);
 }
 
 /// At the state's time, which is the frame's, before the frame changes it: does it show the motion since the last image
@@ -341,7 +427,6 @@ void Filter::use_image(const FeatureFrame& frame, bool still) {
     update_with_features(frame, leaving);
     make_room(leaving);
   }
-  image_T_WB_ = {state_.imu.R_WB, state_.imu.p_WB};
   statistics_.clones = static_cast<int>(state_.clones.size());
 }
 
@@ -367,7 +452,7 @@ std::optional<Estimate> Filter::finish_frame(bool image, const FrameAgreement& a
     frame.horizontal_sigma = std::sqrt(variance.segment<2>(estimate_error::position).maxCoeff());
     frame.vertical_sigma = std::sqrt(variance(estimate_error::position + 2));
   }
-  monitor_.add_frame(frame, log_.records(), imu_.newest().t_ns);
+  monitor_.add_frame(frame, log_.records());
   if (frame.running && !frame.possible) stop();
   if (!estimate || !usable()) return std::nullopt;
   estimate->health = monitor_.health();
@@ -401,11 +486,18 @@ Status Filter::status() const { return status_ == Status::tracking && monitor_.l
 
 std::optional<Estimate> Filter::process_without_image(TimeNs t_ns) {
   if (!covers(t_ns) || !is_next(t_ns)) return std::nullopt;
+  if (status_ == Status::tracking && !calibration_.cameras.empty() && !on_ground()) return std::nullopt;
   FeatureFrame nothing;
   nothing.t_ns = t_ns;
   const bool still = begin_frame(nothing);
   if (status_ != Status::tracking) return finish_frame(false, FrameAgreement{});
 
+  go_on_blind(still);
+  return finish_frame(false, FrameAgreement{});
+}
+
+/// At a frame's time, from all but the images.
+void Filter::go_on_blind(bool still) {
   if (still && clone_is_here_) {
     hold_still();
   } else if (still) {
@@ -415,7 +507,6 @@ std::optional<Estimate> Filter::process_without_image(TimeNs t_ns) {
     clone_is_here_ = false;
   }
   statistics_.clones = static_cast<int>(state_.clones.size());
-  return finish_frame(false, FrameAgreement{});
 }
 
 /// What comes before anything is done with the features: start if possible, propagate. Does the vehicle stand?
@@ -468,7 +559,6 @@ void Filter::start_again(const FeatureFrame& frame) {
 void Filter::stop() {
   status_ = Status::lost;
   state_.imu = ImuState{};
-  impact_guard_ = ImpactGuard(config_.impact, calibration_.imu);  // the next start may lie before its last sample
   state_.clones.clear();
   state_.camera = camera_state(calibration_);
   state_.odometer = odometer_state(calibration_);
@@ -478,6 +568,9 @@ void Filter::stop() {
   ranges_.clear();
   displacement_.reset();
   displacement_turns_.clear();
+  bias_watch_.clear();
+  imu_hole_.reset();
+  imu_doubtful_ = false;
   agrees_since_ns_.fill(0);
   ground_known_ = false;
   clone_is_here_ = false;
@@ -486,7 +579,7 @@ void Filter::stop() {
 
 /// Before anything of the interval up to t_ns is used: how far the body goes in it, told by each sensor alone.
 void Filter::compare_sensors(const FeatureFrame& frame, TimeNs t_ns) {
-  const ImuMotion motion = imu_motion(state_.imu, imu_, t_ns, calibration_.imu, impact_guard_);
+  const ImuMotion motion = imu_motion(state_.imu, imu_, t_ns, calibration_.imu);
   Displacements displacements;
   displacements[index_of(MotionSensor::imu)] = imu_displacement(motion, covariance_);
   displacements[index_of(MotionSensor::odometer)] = displacement_by_wheels(t_ns);
@@ -680,24 +773,42 @@ void Filter::advance(TimeNs t_ns) {
   if (t_ns <= state_.imu.t_ns) return;
   ErrorTransition total;
   const double duration = seconds_between(state_.imu.t_ns, t_ns);
-  imu_.for_each_piece(state_.imu.t_ns, t_ns,
-                      [&](const Eigen::Vector3d& gyro_B, const Eigen::Vector3d& accel_B, double dt) {
-                        ImuCalibration noise = calibration_.imu;
-                        const ImuNoiseFactors factors = impact_guard_.add({state_.imu.t_ns, gyro_B, accel_B});
-                        noise.gyro_noise *= factors.gyro;
-                        noise.accel_noise *= factors.accel / trust(MotionSensor::imu);
-                        if (dt > config_.max_imu_gap) {
-                          noise.gyro_noise *= kGapNoiseFactor;
-                          noise.accel_noise *= kGapNoiseFactor;
-                        }
-                        chain(total, error_transition(state_.imu, gyro_B, accel_B, dt, noise));
-                        state_.imu = integrate(state_.imu, gyro_B, accel_B, dt);
-                        rate_B_ = gyro_B - state_.imu.b_g;
-                      });
+  imu_.for_each_piece(
+      state_.imu.t_ns, t_ns,
+      [&](const Eigen::Vector3d& gyro_B, const Eigen::Vector3d& accel_B, double dt, const ImuNoiseFactors& factors) {
+        ImuCalibration noise = calibration_.imu;
+        noise.gyro_noise *= factors.gyro;
+        noise.accel_noise *= factors.accel / trust(MotionSensor::imu);
+        imu_doubtful_ = imu_doubtful_ || noise.gyro_noise * std::sqrt(dt) > kDoubtfulTurn;
+        if (imu_hole_ && state_.imu.t_ns >= imu_hole_->from_ns) {
+          noise.gyro_noise *= kGapNoiseFactor;
+          noise.accel_noise *= kGapNoiseFactor;
+        }
+        chain(total, error_transition(state_.imu, gyro_B, accel_B, dt, noise));
+        state_.imu = integrate(state_.imu, gyro_B, accel_B, dt);
+        rate_B_ = gyro_B - state_.imu.b_g;
+      });
   state_.imu.t_ns = t_ns;
   const double walk = config_.odometer.normal_walk;
   const double distance = encoder_ ? state_.imu.v_W.norm() * duration : 0.0;
   covariance_.propagate(total, tangent_basis(state_.ground.n_W), walk * walk * distance);
+  leave_imu_hole();
+}
+
+/// Where samples are missing, they may be lost, or the clock jumped: the vehicle went on meanwhile, or it did not.
+void Filter::leave_imu_hole() {
+  if (!imu_hole_ || state_.imu.t_ns < imu_hole_->to_ns) return;
+  const double unseen = imu_hole_->unseen;
+  imu_hole_.reset();
+  imu_doubtful_ = true;
+  doubt_motion(unseen * rate_B_.norm(), kHoleAccel * unseen, unseen * state_.imu.v_W.norm());
+}
+
+/// With an attitude that may be some degrees off, wheels and lasers would be linearized in the wrong place: the next
+/// image comes first, if there is one soon.
+bool Filter::waits_for_bridge() const {
+  return imu_doubtful_ && any_image_ && calibration_.cameras.size() == 2 &&
+         seconds_between(imu_time(last_image_ns_), state_.imu.t_ns) < kImageSoon;
 }
 
 /// Propagates to t_ns, taking in wheels and lasers on the way: each at its own time, or, if the state has passed that
@@ -709,8 +820,11 @@ void Filter::advance_measuring(TimeNs t_ns) {
     const TimeNs next_ns = wheels_next ? middle(turns_.front()) : ranges_.front().t_ns;
     if (next_ns > t_ns) break;
     advance(next_ns);
+    const bool used = !waits_for_bridge();
     if (wheels_next) {
-      if (config_.odometer.update == OdometerUpdate::velocity) {
+      if (!used) {
+        displacement_.reset();
+      } else if (config_.odometer.update == OdometerUpdate::velocity) {
         update_with_wheels(turns_.front());
       } else if (rolls_at(turns_.front().from_ns)) {
         if (displacement_turns_.full()) displacement_turns_.pop();
@@ -721,7 +835,7 @@ void Filter::advance_measuring(TimeNs t_ns) {
       passed_turn_ = turns_.front();
       turns_.pop();
     } else {
-      update_with_beams(ranges_.front());
+      if (used) update_with_beams(ranges_.front());
       ranges_.pop();
     }
   }
@@ -758,15 +872,12 @@ void Filter::update_with_wheels(const WheelTurn& turn) {
   const OdometerConfig& odometer = config_.odometer;
   const double dt = turn.duration();
   const Motion motion = motion_at(turn.from_ns + (turn.to_ns - turn.from_ns) / 2);
-  Eigen::Vector3d turned_B = Eigen::Vector3d::Zero();
-  imu_.for_each_piece(turn.from_ns, turn.to_ns,
-                      [&](const Eigen::Vector3d& gyro_B, const Eigen::Vector3d&, double d) { turned_B += gyro_B * d; });
-  WheelRows rows =
-      linearize_wheels(state_, motion.R_WB, motion.v_W, turn, turned_B / dt, odometer.model, sees_ground());
+  const MeanRate rate = imu_.mean_rate(turn.from_ns, turn.to_ns);
+  WheelRows rows = linearize_wheels(state_, motion.R_WB, motion.v_W, turn, rate.gyro_B, odometer.model, sees_ground());
 
   const double per_root_metre = std::sqrt(std::abs(rows.wheel_speed) / dt);
-  const double yaw_rate = (turned_B / dt - state_.imu.b_g).norm();
-  const double gyro_noise = calibration_.imu.gyro_noise / std::sqrt(dt);
+  const double yaw_rate = (rate.gyro_B - state_.imu.b_g).norm();
+  const double gyro_noise = rate.noise_factor * calibration_.imu.gyro_noise / std::sqrt(dt);
   const double count_noise = std::sqrt(2.0) * calibration_.encoder->noise_counts * 2.0 * M_PI /
                              static_cast<double>(calibration_.encoder->resolution) / dt *
                              state_.odometer.wheel_radius.mean() / std::sqrt(2.0);
@@ -886,11 +997,8 @@ void Filter::add_to_displacement(TimeNs until_ns) {
     }
     const TimeNs end_ns = last ? until_ns : std::min(until_ns, turn.to_ns);
     const double dt = seconds_between(displacement_ns_, end_ns);
-    Eigen::Vector3d turned_B = Eigen::Vector3d::Zero();
-    imu_.for_each_piece(displacement_ns_, end_ns, [&](const Eigen::Vector3d& gyro_B, const Eigen::Vector3d&, double d) {
-      turned_B += gyro_B * d;
-    });
-    displacement_->add_interval(turned_B / dt, dt, turn.angle * (dt / turn.duration()));
+    const MeanRate rate = imu_.mean_rate(displacement_ns_, end_ns);
+    displacement_->add_interval(rate.gyro_B, dt, turn.angle * (dt / turn.duration()), rate.noise_factor);
     displacement_ns_ = end_ns;
   }
 }
@@ -982,20 +1090,18 @@ void Filter::hold_still() {
   statistics_.standing = true;
   const StandstillConfig& still = config_.standstill;
   const ImuState& x = state_.imu;
-  const Pose& held = state_.clones.back().T_WB;
-  const int clone = err::clone(static_cast<int>(state_.clones.size()) - 1);
-  const int columns = clone + err::clone_size;
+  const int newest = static_cast<int>(state_.clones.size()) - 1;
+  const RelativeMotionRows rows = linearize_relative_motion(state_, newest, Pose{});
+  const int columns = err::clone(newest) + err::clone_size;
   const Eigen::Matrix3d I = Eigen::Matrix3d::Identity();
+  Eigen::Matrix<double, 6, 1> weight;
+  weight << Eigen::Vector3d::Constant(1.0 / still.rotation_sigma),
+      Eigen::Vector3d::Constant(1.0 / still.position_sigma);
   Eigen::MatrixXd H = Eigen::MatrixXd::Zero(9, columns);
   Eigen::Matrix<double, 9, 1> r;
-  H.block<3, 3>(0, err::theta) = I / still.rotation_sigma;
-  H.block<3, 3>(0, clone) = -I / still.rotation_sigma;
-  r.segment<3>(0) = -log_so3(x.R_WB * held.R.transpose()) / still.rotation_sigma;
-  H.block<3, 3>(3, err::theta) = -skew(x.p_WB) / still.position_sigma;
-  H.block<3, 3>(3, err::rho) = I / still.position_sigma;
-  H.block<3, 3>(3, clone) = skew(held.p) / still.position_sigma;
-  H.block<3, 3>(3, clone + 3) = -I / still.position_sigma;
-  r.segment<3>(3) = (held.p - x.p_WB) / still.position_sigma;
+  H.topLeftCorner<6, err::imu_size>() = weight.asDiagonal() * rows.H;
+  H.topRightCorner<6, err::clone_size>() = weight.asDiagonal() * rows.H_clone;
+  r.head<6>() = weight.asDiagonal() * rows.residual;
   H.block<3, 3>(6, err::theta) = -skew(x.v_W) / still.velocity_sigma;
   H.block<3, 3>(6, err::nu) = I / still.velocity_sigma;
   r.segment<3>(6) = -x.v_W / still.velocity_sigma;
@@ -1152,8 +1258,25 @@ double Filter::median_parallax_px(const Clone& from, const Clone& to) const {
 void Filter::update(const Eigen::Ref<const Eigen::MatrixXd>& H, int first_column,
                     const Eigen::Ref<const Eigen::VectorXd>& r) {
   const int considered = learn_calibration_ ? 0 : err::calibration_size;
+  const auto variance = [this] { return covariance_.matrix().diagonal().segment<6>(err::b_g); };
+  const BiasWatch::Vector6 before = variance();
   const Eigen::Ref<const Eigen::VectorXd> correction = covariance_.update(H, first_column, r, err::camera, considered);
-  if (correction.allFinite()) boxplus_in_place(state_, correction);  // else the covariance shows it: possible()
+  if (!correction.allFinite()) return;  // the covariance shows it: possible()
+  bias_watch_.add(correction.segment<6>(err::b_g), before - variance());
+  boxplus_in_place(state_, correction);
+}
+
+/// A bias that jumped is as little known as at the start, and took the motion along until it was found out.
+void Filter::watch_biases(double dt) {
+  const BiasWatch::Verdict jumped = bias_watch_.judge(dt);
+  if (!jumped.gyro && !jumped.accel) return;
+  const double gyro = jumped.gyro ? config_.prior.gyro_bias : 0.0;
+  const double accel = jumped.accel ? config_.prior.accel_bias : 0.0;
+  doubt_motion(gyro * kBiasDelay, accel * kBiasDelay, 0.5 * accel * kBiasDelay * kBiasDelay);
+  Eigen::Matrix<double, 6, 1> sigma;
+  sigma << Eigen::Vector3d::Constant(gyro), Eigen::Vector3d::Constant(accel);
+  covariance_.widen(err::b_g, sigma.cwiseAbs2().asDiagonal().toDenseMatrix());
+  monitor_.add_bias_jump(jumped.gyro, jumped.accel, state_.imu.t_ns);
 }
 
 int Filter::clone_index(std::uint64_t frame) const {

@@ -15,6 +15,7 @@
 #include "ear/odometry.h"
 #include "ear/types.h"
 #include "filter/anchor.h"
+#include "filter/bias_watch.h"
 #include "filter/camera_displacement.h"
 #include "filter/chi_squared.h"
 #include "filter/consistency.h"
@@ -68,7 +69,8 @@ class Filter {
   /// are not finite, that no camera can see, or that come twice are left out and counted.
   std::optional<Estimate> process(const FeatureFrame& frame);
 
-  /// The same at a time without an image, from all other sensors; a camera's stamp. Tracks go on over it.
+  /// The same at a time without an image, from all other sensors; a camera's stamp. Tracks go on over it. Nothing where
+  /// these have nothing to tell: with cameras, off the ground. Images that come late can then still be used.
   std::optional<Estimate> process_without_image(TimeNs t_ns);
 
   /// The newest state carried on by the samples to `t_ns` (IMU time). Nothing before the start, while lost, and later
@@ -100,12 +102,22 @@ class Filter {
     Eigen::Vector3d v_W;
   };
 
+  /// Where no inertial samples are, though time passed: a gap, or a clock that jumped.
+  struct ImuHole {
+    TimeNs from_ns = 0;
+    TimeNs to_ns = 0;     ///< at once, if the clock jumped back
+    double unseen = 0.0;  ///< [s] that passed
+  };
+
   static constexpr TimeNs kDisagrees = -1;
 
   [[nodiscard]] TimeNs imu_time(TimeNs camera_time_ns) const;
   [[nodiscard]] std::optional<TimeNs> state_time() const;
   void restart(TimeNs t_ns, TimeNs clock_shift);
   void mend_spike(const ImuSample& next);
+  void leave_imu_hole();
+  void doubt_motion(double rotation, double velocity, double position);
+  void watch_biases(double dt);
   bool try_start(TimeNs t_ns, const ImuStatistics& imu, bool still);
   bool try_rolling_start();
   bool try_moving_start(const FeatureFrame& frame);
@@ -120,7 +132,11 @@ class Filter {
   [[nodiscard]] Displacement displacement_by_wheels(TimeNs until_ns) const;
   [[nodiscard]] WheelNoise wheel_noise() const;
   [[nodiscard]] double trust(MotionSensor sensor) const;
+  [[nodiscard]] bool repeats_last_image(const FeatureFrame& frame) const;
+  [[nodiscard]] bool waits_for_bridge() const;
+  void bridge(const FeatureFrame& frame);
   [[nodiscard]] FrameAgreement check_frame(const FeatureFrame& frame);
+  void go_on_blind(bool still);
   void use_image(const FeatureFrame& frame, bool still);
   [[nodiscard]] std::optional<Estimate> finish_frame(bool image, const FrameAgreement& agreement);
   [[nodiscard]] NavState predict_here(TimeNs t_ns) const;
@@ -173,6 +189,10 @@ class Filter {
   ImuBuffer imu_;
   InputGuard guard_;
   ImpactGuard impact_guard_;
+  std::optional<ImuHole> imu_hole_;  ///< ahead of the state, or around it
+  bool imu_doubtful_ = false;        ///< samples since the last image may be wrong by more than noise
+  BiasWatch bias_watch_;
+  TimeNs watched_ns_ = 0;                             ///< when it last judged
   Eigen::Vector3d rate_B_ = Eigen::Vector3d::Zero();  ///< mean rate of the last piece integrated, bias removed [rad/s]
   std::optional<EncoderReader> encoder_;
   Ring<WheelTurn> turns_;                            ///< not yet passed by the state
@@ -206,10 +226,11 @@ class Filter {
   FrameCheck frame_check_;
   HealthMonitor monitor_;
   MovingStart moving_start_;
-  std::optional<TimeNs> lifted_ns_;           ///< when the velocity last did not lie in the ground
-  Anchor anchor_;                             ///< of the state's world in that of the estimates
-  std::optional<Estimate> last_good_;         ///< the last estimate that rested on more than inertia
-  SourceLog log_;                             ///< what each sensor measured, against what was expected
+  std::optional<TimeNs> lifted_ns_;    ///< when the velocity last did not lie in the ground
+  Anchor anchor_;                      ///< of the state's world in that of the estimates
+  std::optional<Estimate> last_good_;  ///< the last estimate that rested on more than inertia
+  SourceLog log_;                      ///< what each sensor measured, against what was expected
+  std::vector<StereoMatch> bridge_matches_;
   std::array<double, 2> camera_squares_{};    ///< of this frame's features: residuals of either camera [px^2]
   std::array<int, 2> camera_observations_{};  ///< how many of them, one for each axis
 

@@ -35,6 +35,9 @@ constexpr double kWorstVelocity = 1.0;   // [m/s] standard deviation of a veloci
 constexpr double kWorstDirection = 0.2;  // [rad] or of its direction, if more: one that is fast need not know it better
 constexpr double kContradicted = 1.0;    // [s]
 
+/// Left and right exchanged: what both see lies behind them.
+bool crossed(const FrameAgreement& seen) { return seen.matches > 0 && seen.behind > kMajority; }
+
 }  // namespace
 
 void Trust::add(bool wrong, TimeNs t_ns) {
@@ -168,8 +171,7 @@ void HealthMonitor::note_silence(TimeNs t_ns) {
   decide(t_ns);
 }
 
-void HealthMonitor::add_frame(const Frame& frame, const std::array<SourceRecord, kSourceCount>& records,
-                              TimeNs newest_imu_ns) {
+void HealthMonitor::add_frame(const Frame& frame, const std::array<SourceRecord, kSourceCount>& records) {
   const TimeNs t_ns = frame.t_ns;
   last_ = frame;
   last_refused_imu_ns_.reset();
@@ -180,7 +182,7 @@ void HealthMonitor::add_frame(const Frame& frame, const std::array<SourceRecord,
     }
     last_frame_ns_ = t_ns;
     judge_cameras(frame);
-    if (camera_stamps_.add(t_ns, newest_imu_ns)) {
+    if (camera_stamps_unusual_) {
       for (std::size_t camera = 0; camera < cameras_; ++camera) trust_[camera].accuse(t_ns);
     }
   }
@@ -197,6 +199,13 @@ void HealthMonitor::add_frame(const Frame& frame, const std::array<SourceRecord,
   health_.quality = quality(frame);
 }
 
+bool HealthMonitor::check_image(const FrameAgreement& agreement, TimeNs t_ns, TimeNs newest_imu_ns) {
+  camera_stamps_unusual_ = camera_stamps_.add(t_ns, newest_imu_ns);
+  const bool elsewhere = agreement.matches > 0 && agreement.left > kManyOff;
+  camera_stamps_wrong_ = camera_stamps_unusual_ && (camera_stamps_wrong_ || elsewhere);
+  return !agreement.frozen && !crossed(agreement) && !camera_stamps_wrong_;
+}
+
 void HealthMonitor::judge_cameras(const Frame& frame) {
   if (cameras_ == 0) return;
   const TimeNs t_ns = frame.t_ns;
@@ -208,8 +217,7 @@ void HealthMonitor::judge_cameras(const Frame& frame) {
     const bool one_eyed = frame.statistics.stereo < kFewStereo * frame.statistics.tracks;
     trust(Source::camera_right).add(blind || one_eyed || (known && seen.right > kManyOff), t_ns);
   }
-  const bool crossed = known && seen.behind > kMajority;
-  if ((seen.matches > 0 && seen.frozen) || crossed) {
+  if (seen.frozen || (known && crossed(seen))) {
     for (std::size_t camera = 0; camera < cameras_; ++camera) trust_[camera].accuse(t_ns);
   }
 }

@@ -1,5 +1,5 @@
 // From what each sensor measured to what the estimator says of itself: which sensors it does not rest on, whether it
-// may be used. It changes no estimate. docs/health.md gives the rules and their times.
+// may be used, and which images may. docs/health.md gives the rules and their times.
 #pragma once
 
 #include <array>
@@ -63,12 +63,17 @@ class HealthMonitor {
   /// One whose stamp or values cannot be.
   void add_refused_imu();
   void add_spike(bool gyro, bool accel, TimeNs t_ns);
+  void add_bias_jump(bool gyro, bool accel, TimeNs t_ns) { add_spike(gyro, accel, t_ns); }
   /// A reading, used or refused, and the stamp of the newest inertial sample.
   void add_encoder(const EncoderSample& sample, Verdict verdict, TimeNs imu_ns);
   void add_laser(const LaserSample& sample, Verdict verdict, const LaserCalibration& lasers, TimeNs imu_ns);
 
   /// A frame that no inertial samples reach.
   void add_refused_frame(TimeNs imu_ns);
+
+  /// Whether an image may be used, by how it agrees with what the state and the other sensors expect of it. Not one
+  /// that repeats the last; not left and right exchanged; not one with a stamp that jumped, which a late one did not.
+  [[nodiscard]] bool check_image(const FrameAgreement& agreement, TimeNs t_ns, TimeNs newest_imu_ns);
 
   /// What is known after a frame was used.
   struct Frame {
@@ -84,7 +89,7 @@ class HealthMonitor {
     double horizontal_sigma = 0.0;  ///< [m]
     double vertical_sigma = 0.0;    ///< [m]
   };
-  void add_frame(const Frame& frame, const std::array<SourceRecord, kSourceCount>& records, TimeNs newest_imu_ns);
+  void add_frame(const Frame& frame, const std::array<SourceRecord, kSourceCount>& records);
 
   [[nodiscard]] const Health& health() const { return health_; }
   [[nodiscard]] bool lost() const { return health_.status == HealthStatus::lost; }
@@ -119,6 +124,8 @@ class HealthMonitor {
   std::array<int, kMaxBeams> repeated_{};
   std::array<bool, kMaxBeams> no_return_{};
   StampWatch camera_stamps_, encoder_stamps_, laser_stamps_;
+  bool camera_stamps_unusual_ = false;
+  bool camera_stamps_wrong_ = false;
   Eigen::Vector3d turn_rate_ = Eigen::Vector3d::Zero();  ///< of the cameras less that of the gyroscope [rad/s], recent
   double turn_scatter_ = 1e-4;                           ///< [rad^2/s^2] of the single ones
   bool turns_otherwise_ = false;

@@ -7,7 +7,8 @@ namespace ear {
 namespace {
 
 constexpr double kSpread = 4.0;        // deviations from the mean, in standard deviations, are ordinary
-constexpr double kErrorShare = 0.1;    // of a deviation: bandwidth, scale and timing make that much of it wrong
+constexpr double kAccelShare = 0.1;    // of a deviation: bandwidth, scale and timing make that much of it wrong
+constexpr double kGyroShare = 1.0;     // no body turns so suddenly: as much as a limit that is not known yet may hide
 constexpr double kLongest = 0.06;      // [s] a longer deviation is no strike, but how the vehicle moves
 constexpr double kFull = 0.98;         // of the range or more is clipped
 constexpr double kFlat = 1e-6;         // relative: two extreme values as equal as this were cut off
@@ -25,6 +26,7 @@ double ExcessWatch::add(const Eigen::Vector3d& value, double dt) {
   const Eigen::Vector3d deviation = value - mean_;
   const double distance = deviation.norm();
   const double ordinary = std::max(least_, kSpread * std::sqrt(variance_));
+  const bool limit_known = range_ > 0.0 || clip_level_ > 0.0;
   const bool cut_off = clipped(value);
   last_ = value;
 
@@ -37,12 +39,13 @@ double ExcessWatch::add(const Eigen::Vector3d& value, double dt) {
 
   const bool strikes = distance > ordinary;
   lasts_ = strikes || cut_off ? lasts_ + 1 : 0;
+  clipped_before_ = cut_off && !limit_known ? lasts_ - 1 : 0;
   lasting_ = lasts_ > 1 ? lasting_ + dt : 0.0;
   // The errors of one strike have one sign. White noise adds up as they do if the k-th sample has 2 k - 1 times the
   // variance: n samples then have n^2 times that of one.
   const double coherent = std::sqrt(std::max(0.0, 2.0 * lasts_ - 1.0));
   if (cut_off) return coherent * std::max(distance, least_);
-  return strikes && lasting_ < kLongest ? coherent * kErrorShare * distance : 0.0;
+  return strikes && lasting_ < kLongest ? coherent * error_share_ * distance : 0.0;
 }
 
 /// At the end of a known range; or, where it is not known, at the level of a flat top: the same extreme value twice.
@@ -60,8 +63,8 @@ bool ExcessWatch::clipped(const Eigen::Vector3d& value) {
 }
 
 ImpactGuard::ImpactGuard(const ImpactConfig& config, const ImuCalibration& imu)
-    : gyro_(config.gyro_range, config.gyro_deviation, kGyroMemory),
-      accel_(config.accel_range, config.accel_deviation, kAccelMemory),
+    : gyro_(config.gyro_range, config.gyro_deviation, kGyroMemory, kGyroShare),
+      accel_(config.accel_range, config.accel_deviation, kAccelMemory, kAccelShare),
       gyro_sigma_(imu.gyro_noise * std::sqrt(imu.rate_hz)),
       accel_sigma_(imu.accel_noise * std::sqrt(imu.rate_hz)) {}
 

@@ -4,8 +4,9 @@
 
 namespace ear {
 
-void ImuBuffer::push(const ImuSample& sample) {
-  samples_[(first_ + size_) % samples_.size()] = sample;
+void ImuBuffer::push(const ImuSample& sample, const ImuNoiseFactors& noise) {
+  samples_[slot(size_)] = sample;
+  noise_[slot(size_)] = noise;
   if (size_ < samples_.size()) {
     ++size_;
   } else {
@@ -45,9 +46,34 @@ ImuSample ImuBuffer::interpolate(std::size_t next, TimeNs t_ns) const {
 }
 
 void ImuBuffer::correct_newest(const Eigen::Vector3d& gyro_B, const Eigen::Vector3d& accel_B) {
-  ImuSample& newest = samples_[(first_ + size_ - 1) % samples_.size()];
+  ImuSample& newest = samples_[slot(size_ - 1)];
   newest.gyro_B = gyro_B;
   newest.accel_B = accel_B;
+  noise_[slot(size_ - 1)] = ImuNoiseFactors{};
+}
+
+void ImuBuffer::doubt_newest(std::size_t count, const ImuNoiseFactors& noise) {
+  for (std::size_t i = size_ - std::min(count, size_); i < size_; ++i) {
+    ImuNoiseFactors& factors = noise_[slot(i)];
+    factors = {std::max(factors.gyro, noise.gyro), std::max(factors.accel, noise.accel)};
+  }
+}
+
+ImuNoiseFactors ImuBuffer::noise_around(std::size_t next) const {
+  const ImuNoiseFactors& a = noise_[slot(next == 0 ? 0 : std::min(next, size_) - 1)];
+  const ImuNoiseFactors& b = noise_[slot(std::min(next, size_ - 1))];
+  return {std::max(a.gyro, b.gyro), std::max(a.accel, b.accel)};
+}
+
+MeanRate ImuBuffer::mean_rate(TimeNs from_ns, TimeNs to_ns) const {
+  MeanRate rate;
+  for_each_piece(from_ns, to_ns,
+                 [&](const Eigen::Vector3d& gyro_B, const Eigen::Vector3d&, double dt, const ImuNoiseFactors& noise) {
+                   rate.gyro_B += gyro_B * dt;
+                   rate.noise_factor = std::max(rate.noise_factor, noise.gyro);
+                 });
+  rate.gyro_B /= seconds_between(from_ns, to_ns);
+  return rate;
 }
 
 ImuStatistics ImuBuffer::statistics(TimeNs from_ns, TimeNs to_ns) const {

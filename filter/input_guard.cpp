@@ -38,11 +38,20 @@ ImuVerdict InputGuard::judge(const ImuSample& sample) {
   const Stamp stamp = imu_stamps_.judge(sample.t_ns);
   if (stamp == Stamp::not_later || stamp == Stamp::far_ahead) {
     ++(stamp == Stamp::not_later ? counts.not_later : counts.far_ahead);
+    if (stamp == Stamp::not_later) {
+      if (!refused_from_ns_) refused_from_ns_ = sample.t_ns;
+      refused_to_ns_ = sample.t_ns;
+    }
     return verdict;
   }
   ++counts.accepted;
   const double step = imu_ns_ ? seconds_between(*imu_ns_, sample.t_ns) : 0.0;
-  if (step > max_imu_gap_) ++counts.gaps;
+  if (step > max_imu_gap_) {
+    ++counts.gaps;
+    verdict.unseen = step;
+  }
+  if (refused_from_ns_) verdict.unseen = std::max(verdict.unseen, seconds_between(*refused_from_ns_, refused_to_ns_));
+  refused_from_ns_.reset();
   verdict.accepted = true;
   verdict.begins_anew = stamp == Stamp::set_back || step > kLostAfter;
   if (stamp == Stamp::set_back) verdict.clock_shift = imu_stamps_.clock_shift();

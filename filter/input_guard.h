@@ -17,6 +17,7 @@ namespace ear {
 struct ImuVerdict {
   bool accepted = false;
   bool begins_anew = false;  ///< after a hole of 2 s, or with another clock: where the vehicle is now nobody knows
+  double unseen = 0.0;       ///< [s] since the sample before, if some are missing between: lost, or refused
   TimeNs clock_shift = 0;    ///< what the stamps before are to be moved by, if the clock was set back [ns]
 };
 
@@ -56,6 +57,8 @@ class InputGuard {
   InputCounts counts_;
   StampGuard imu_stamps_;
   std::optional<TimeNs> imu_ns_;           ///< the newest inertial sample accepted
+  std::optional<TimeNs> refused_from_ns_;  ///< since the newest, not later than it: stamps of the first
+  TimeNs refused_to_ns_ = 0;               ///< and the last
   std::optional<TimeNs> last_encoder_ns_;  ///< the newest reading accepted
   std::optional<TimeNs> last_laser_ns_;    ///< the same
   FeatureFrame sound_frame_;

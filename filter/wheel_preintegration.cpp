@@ -81,7 +81,8 @@ void WheelPreintegration::set_normal(const Eigen::Vector3d& n_Bk, double sigma) 
       by_errors.middleCols<3>(kXi) * J_normal_xi.transpose() + sigma * sigma * J_normal_xi * J_normal_xi.transpose();
 }
 
-void WheelPreintegration::add_interval(const Eigen::Vector3d& gyro_B, double dt, const Eigen::Vector2d& turn) {
+void WheelPreintegration::add_interval(const Eigen::Vector3d& gyro_B, double dt, const Eigen::Vector2d& turn,
+                                       double gyro_factor) {
   assert(dt > 0.0);
   const Eigen::Vector3d rate = gyro_B - b_g_;
   const Eigen::Vector3d half_turn = 0.5 * dt * rate;
@@ -127,7 +128,7 @@ void WheelPreintegration::add_interval(const Eigen::Vector3d& gyro_B, double dt,
   const double path = 0.5 * rolled.cwiseAbs().sum();
   const Eigen::Vector3d left = n_Bi_.cross(heading.f);
   const auto squared = [](double value) { return value * value; };
-  Q_ = (F * Q_ * F.transpose() + squared(noise_.gyro) / dt * by_gyro * by_gyro.transpose()).eval();
+  Q_ = (F * Q_ * F.transpose() + squared(gyro_factor * noise_.gyro) / dt * by_gyro * by_gyro.transpose()).eval();
   Q_.block<3, 3>(kAlpha, kAlpha) += path * (squared(noise_.slip) * heading.f * heading.f.transpose() +
                                             squared(noise_.side_slip) * left * left.transpose() +
                                             squared(noise_.roughness) * n_Bi_ * n_Bi_.transpose());

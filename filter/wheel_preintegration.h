@@ -64,8 +64,8 @@ class WheelPreintegration {
 
   /// One interval of `dt` > 0 seconds: mean rate as measured [rad/s], and how far the wheels turned relative to the
   /// body (left, right, forward positive) [rad]. Intervals follow each other without gaps, and each starts with the
-  /// readings that ended the one before.
-  void add_interval(const Eigen::Vector3d& gyro_B, double dt, const Eigen::Vector2d& turn);
+  /// readings that ended the one before. `gyro_factor`: on the gyroscope's noise meanwhile.
+  void add_interval(const Eigen::Vector3d& gyro_B, double dt, const Eigen::Vector2d& turn, double gyro_factor = 1.0);
 
   [[nodiscard]] WheelDisplacement result() const;
 

@@ -19,8 +19,6 @@ namespace {
 constexpr TimeNs kStart = 1'000'000'000;
 constexpr TimeNs kEnd = kStart + 200'000'000;
 
-ImpactGuard guard() { return {ImpactConfig{}, ImuCalibration{}}; }
-
 /// A vehicle that turns and shakes, 200 samples a second.
 ImuBuffer random_samples(std::mt19937_64& rng, const State& x, double accel_noise = 0.0) {
   std::mt19937_64 motion{5};
@@ -87,7 +85,7 @@ TEST_CASE("displacements: the IMU's is where propagation takes the body, and H i
     samples.for_each_piece(kStart, kEnd, [&](const Eigen::Vector3d& gyro_B, const Eigen::Vector3d& accel_B, double dt) {
       end = integrate(end, gyro_B, accel_B, dt);
     });
-    const ImuMotion motion = imu_motion(x.imu, samples, kEnd, ImuCalibration{}, guard());
+    const ImuMotion motion = imu_motion(x.imu, samples, kEnd, ImuCalibration{});
     CHECK((motion.p_BiBj - x.imu.R_WB.transpose() * (end.p_WB - x.imu.p_WB)).norm() < 1e-9);
     CHECK((motion.R_BiBj - x.imu.R_WB.transpose() * end.R_WB).norm() < 1e-9);
     CHECK(motion.duration == doctest::Approx(0.2));
@@ -95,7 +93,7 @@ TEST_CASE("displacements: the IMU's is where propagation takes the body, and H i
         [&](const Eigen::VectorXd& d) -> Eigen::VectorXd {
           Eigen::VectorXd error = Eigen::VectorXd::Zero(x.error_size());
           error.head<err::imu_size>() = d;
-          return imu_motion(boxplus(x, error).imu, samples, kEnd, ImuCalibration{}, guard()).p_BiBj;
+          return imu_motion(boxplus(x, error).imu, samples, kEnd, ImuCalibration{}).p_BiBj;
         },
         motion.H);
   }
@@ -106,12 +104,12 @@ TEST_CASE("displacements: the IMU's noise spreads it as its covariance says") {
   const State x = random_start(rng);
   ImuCalibration noise;
   const double sample_noise = noise.accel_noise * std::sqrt(200.0);
-  const ImuMotion clean = imu_motion(x.imu, random_samples(rng, x), kEnd, noise, guard());
+  const ImuMotion clean = imu_motion(x.imu, random_samples(rng, x), kEnd, noise);
   double squares = 0.0;
   constexpr int kRuns = 1000;
   for (int run = 0; run < kRuns; ++run) {
     const ImuBuffer samples = random_samples(rng, x, sample_noise);
-    squares += (imu_motion(x.imu, samples, kEnd, noise, guard()).p_BiBj - clean.p_BiBj).squaredNorm() / kRuns;
+    squares += (imu_motion(x.imu, samples, kEnd, noise).p_BiBj - clean.p_BiBj).squaredNorm() / kRuns;
   }
   CHECK(squares == doctest::Approx(3.0 * clean.position_variance).epsilon(0.1));
 }
@@ -120,14 +118,14 @@ TEST_CASE("displacements: a strike among the samples makes the IMU's uncertain")
   std::mt19937_64 rng{73};
   const State x = random_start(rng);
   ImuBuffer samples = random_samples(rng, x);
-  const double before = imu_motion(x.imu, samples, kEnd, ImuCalibration{}, guard()).position_variance;
+  const double before = imu_motion(x.imu, samples, kEnd, ImuCalibration{}).position_variance;
   ImuBuffer struck(256);
   for (std::size_t i = 0; i < samples.size(); ++i) {
     ImuSample sample = samples[i];
     if (sample.t_ns > kStart + 50'000'000 && sample.t_ns < kStart + 70'000'000) sample.accel_B.z() += 60.0;
     struck.push(sample);
   }
-  CHECK(imu_motion(x.imu, struck, kEnd, ImuCalibration{}, guard()).position_variance > 10.0 * before);
+  CHECK(imu_motion(x.imu, struck, kEnd, ImuCalibration{}).position_variance > 10.0 * before);
 }
 
 TEST_CASE("displacements: the covariance of the IMU's follows from the state's (2000 draws)") {
@@ -145,7 +143,7 @@ TEST_CASE("displacements: the covariance of the IMU's follows from the state's (
   Covariance P(err::clones);
   P.reset(sigma);
   const auto displacement = [&](const State& state) {
-    return imu_displacement(imu_motion(state.imu, samples, kEnd, none, guard()), P);
+    return imu_displacement(imu_motion(state.imu, samples, kEnd, none), P);
   };
   CHECK(mean_chi_squared(rng, x, sigma, displacement(x), displacement) == doctest::Approx(3.0).epsilon(0.1));
 }

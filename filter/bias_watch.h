@@ -1,0 +1,31 @@
+// Did the bias of the gyroscope or of the accelerometer jump? Sound biases walk slowly, and each update corrects them
+// about as much as it lowers their variance. Corrections that add up to more than these variances allow tell of a bias
+// that is elsewhere. docs/filter.md, section 14.
+#pragma once
+
+#include <Eigen/Core>
+
+namespace ear {
+
+class BiasWatch {
+ public:
+  using Vector6 = Eigen::Matrix<double, 6, 1>;  ///< gyroscope [rad/s], accelerometer [m/s^2]
+
+  /// One update: what it added to the biases, and by how much it lowered their variances.
+  void add(const Vector6& correction, const Vector6& variance_lowered);
+
+  struct Verdict {
+    bool gyro = false;
+    bool accel = false;
+  };
+  /// After all updates of the last `dt` seconds: who jumped? What speaks for it is forgotten when it was said.
+  Verdict judge(double dt);
+
+  void clear();
+
+ private:
+  Vector6 sum_ = Vector6::Zero();
+  Vector6 variance_ = Vector6::Zero();
+};
+
+}  // namespace ear
