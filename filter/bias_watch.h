@@ -1,6 +1,6 @@
 // Did the bias of the gyroscope or of the accelerometer jump? Sound biases walk slowly, and each update corrects them
 // about as much as it lowers their variance. Corrections that add up to more than these variances allow tell of a bias
-// that is elsewhere. docs/filter.md, section 14.
+// that is elsewhere. docs/filter.md, section 15.
 #pragma once
 
 #include <Eigen/Core>

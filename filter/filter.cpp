@@ -41,6 +41,7 @@ constexpr double kBridgeRotation = 2e-3;       // [rad] standard deviations with
 constexpr double kBridgePosition = 5e-3;       // [m] well above what the features will tell later
 constexpr double kImageSoon = 0.25;            // [s] after the last one
 constexpr double kBiasDelay = 0.3;             // [s] until a bias that jumped is found out
+constexpr double kFeigned = 3.0;               // standard deviations of the cameras' mounting that feign a turn
 constexpr std::size_t kFewestRepeated = 8;     // features, for two images to be the same
 constexpr double kStartGravityNoise = 0.02;    // [m/s^2] what idling rotors leave in the mean specific force
 constexpr double kKnownSigma = 1e-6;           // [m, rad] of position and yaw at the start: by definition zero
@@ -238,6 +239,7 @@ void Filter::note_contact(ContactEvent event) {
   ground_known_ = false;
   if (event != ContactEvent::takeoff || status_ != Status::tracking) return;
   doubt_motion(0.0, kTakeoffVelocity, kTakeoffPosition);
+  bias_watch_.clear();  // it saw what the odometer did
 }
 
 /// The vehicle may be turned, faster and elsewhere by these standard deviations [rad, m/s, m], each way, whatever was
@@ -327,9 +329,7 @@ std::optional<Estimate> Filter::process(const FeatureFrame& given) {
   }
   const FeatureFrame& frame = guard_.sound(given);
   const bool frozen = repeats_last_image(frame);
-  FeatureFrame nothing;
-  nothing.t_ns = frame.t_ns;
-  const bool still = begin_frame(frozen ? nothing : frame);
+  const bool still = begin_frame(frame, frozen);
   FrameAgreement agreement;
   agreement.frozen = frozen;
   if (status_ == Status::tracking && !frozen) {
@@ -371,7 +371,7 @@ bool Filter::repeats_last_image(const FeatureFrame& frame) const {
 
 /// Where the inertial samples since the last image may be wrong by more than noise (clipped, missing, stamps that
 /// jumped), the two images tell how the body moved, roughly: later, the features of both will tell it in full, around a
-/// state that is near enough to be linear. docs/filter.md, section 14.
+/// state that is near enough to be linear. docs/filter.md, section 15.
 void Filter::bridge(const FeatureFrame& frame) {
   const bool needed = imu_doubtful_;
   imu_doubtful_ = false;
@@ -442,6 +442,8 @@ std::optional<Estimate> Filter::finish_frame(bool image, const FrameAgreement& a
   std::optional<Estimate> estimate;
   if (frame.running) {
     estimate = make_estimate();
+    const auto mounting = covariance_.matrix().diagonal().segment<3>(err::camera).cwiseMax(0.0);
+    frame.feigned_turn = kFeigned * rate_B_.norm() * std::sqrt(mounting.maxCoeff());
     frame.possible = possible();
   }
   if (frame.possible && estimate) {
@@ -489,7 +491,7 @@ std::optional<Estimate> Filter::process_without_image(TimeNs t_ns) {
   if (status_ == Status::tracking && !calibration_.cameras.empty() && !on_ground()) return std::nullopt;
   FeatureFrame nothing;
   nothing.t_ns = t_ns;
-  const bool still = begin_frame(nothing);
+  const bool still = begin_frame(nothing, false);
   if (status_ != Status::tracking) return finish_frame(false, FrameAgreement{});
 
   go_on_blind(still);
@@ -510,7 +512,7 @@ void Filter::go_on_blind(bool still) {
 }
 
 /// What comes before anything is done with the features: start if possible, propagate. Does the vehicle stand?
-bool Filter::begin_frame(const FeatureFrame& frame) {
+bool Filter::begin_frame(const FeatureFrame& frame, bool frozen) {
   any_frame_ = true;
   last_frame_ns_ = frame.t_ns;
   statistics_ = FrameStatistics{};
@@ -523,7 +525,8 @@ bool Filter::begin_frame(const FeatureFrame& frame) {
   const TimeNs t_ns = imu_time(frame.t_ns);
   const bool started = status_ == Status::tracking;
   const ImuStatistics imu = imu_.statistics(t_ns - static_cast<TimeNs>(1e9 * config_.standstill.duration), t_ns);
-  const bool still = standstill_.update(frame, imu, started ? state_.imu.b_g : Eigen::Vector3d::Zero(),
+  const bool still = standstill_.update(frozen ? FeatureFrame{frame.t_ns, {}} : frame, imu,
+                                        started ? state_.imu.b_g : Eigen::Vector3d::Zero(),
                                         started ? config_.standstill.max_gyro : config_.standstill.max_gyro_at_start,
                                         on_ground() ? wheel_rest_.duration(t_ns, kWheelAge) : std::nullopt);
   contact_.set_gyro_bias(state_.imu.b_g);

@@ -127,7 +127,7 @@ class Filter {
   void stop();
   [[nodiscard]] Eigen::VectorXd start_sigma() const;
   void reset_covariance(const Eigen::VectorXd& sigma);
-  bool begin_frame(const FeatureFrame& frame);
+  bool begin_frame(const FeatureFrame& frame, bool frozen);
   void compare_sensors(const FeatureFrame& frame, TimeNs t_ns);
   [[nodiscard]] Displacement displacement_by_wheels(TimeNs until_ns) const;
   [[nodiscard]] WheelNoise wheel_noise() const;

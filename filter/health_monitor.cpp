@@ -262,8 +262,9 @@ void HealthMonitor::judge_turn(const Frame& frame) {
   const double scatter_share = 1.0 - std::exp(-frame_interval_ / kScatterMemory);
   turn_scatter_ += scatter_share * (off * off - turn_scatter_);
   turn_rate_ += share * (rate - turn_rate_);
-  turns_otherwise_ =
-      known && turn_rate_.norm() > std::max(kTurnOff, kTurnSigmas * std::sqrt(0.5 * share * turn_scatter_));
+  feigned_turn_ += share * (frame.feigned_turn - feigned_turn_);
+  const double by_chance = kTurnSigmas * std::sqrt(0.5 * share * turn_scatter_);
+  turns_otherwise_ = known && turn_rate_.norm() > std::max(kTurnOff, by_chance) + feigned_turn_;
 }
 
 bool HealthMonitor::velocity_known() const {

@@ -85,6 +85,7 @@ class HealthMonitor {
     FrameAgreement agreement;
     FrameStatistics statistics;
     double speed = 0.0;             ///< [m/s]
+    double feigned_turn = 0.0;      ///< [rad/s] that errors of the cameras' mounting may make of the vehicle's turning
     double velocity_sigma = 0.0;    ///< [m/s] worst axis, seen from the vehicle
     double horizontal_sigma = 0.0;  ///< [m]
     double vertical_sigma = 0.0;    ///< [m]
@@ -128,6 +129,7 @@ class HealthMonitor {
   bool camera_stamps_wrong_ = false;
   Eigen::Vector3d turn_rate_ = Eigen::Vector3d::Zero();  ///< of the cameras less that of the gyroscope [rad/s], recent
   double turn_scatter_ = 1e-4;                           ///< [rad^2/s^2] of the single ones
+  double feigned_turn_ = 0.0;                            ///< [rad/s] recent
   bool turns_otherwise_ = false;
   std::optional<TimeNs> misled_ns_;                 ///< when wheels last did not fit
   TimeNs last_encoder_ns_ = 0, last_laser_ns_ = 0;  ///< newest inertial stamp when they came

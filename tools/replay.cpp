@@ -1,5 +1,7 @@
 #include "tools/replay.h"
 
+#include <algorithm>
+
 #include "tools/blind_steps.h"
 
 namespace ear::tools {
@@ -27,7 +29,8 @@ class Replay {
  private:
   void take(const ImuSample& imu) {
     odometry_.add_imu(imu);
-    if (waiting_ && imu.t_ns >= waiting_->t_ns + camera_offset_ns_) hand_over();
+    imu_ns_ = imu.t_ns;
+    if (waiting_ && imu_ns_ >= std::min(frame_time(), waiting_until_ns_)) hand_over();
     if (!waiting_ && steps_.due(imu.t_ns)) on_frame_({imu.t_ns, odometry_.step(imu.t_ns)});
   }
   void take(const EncoderSample& encoder) { odometry_.add_encoder(encoder); }
@@ -35,14 +38,19 @@ class Replay {
   void take(const RecordedFrame& frame) {
     hand_over();  // there is one waiting only if the inertial samples stopped
     waiting_ = std::make_unique<RecordedFrame>(frame);
+    waiting_until_ns_ = imu_ns_ + kLongestWait;
   }
+
+  [[nodiscard]] TimeNs frame_time() const { return waiting_->t_ns + camera_offset_ns_; }
 
   void hand_over() {
     if (!waiting_) return;
     on_frame_({waiting_->t_ns, odometry_.add_stereo(*waiting_)});
-    steps_.saw_frame(waiting_->t_ns + camera_offset_ns_);
+    if (frame_time() <= waiting_until_ns_) steps_.saw_frame(frame_time());  // else it was refused
     waiting_.reset();
   }
+
+  static constexpr TimeNs kLongestWait = 60'000'000;
 
   Recording& recording_;
   Odometry& odometry_;
@@ -51,6 +59,8 @@ class Replay {
   TimeNs camera_offset_ns_;
   BlindSteps steps_;
   std::unique_ptr<RecordedFrame> waiting_;
+  TimeNs waiting_until_ns_ = 0;  ///< by then the inertial samples of its stamp have come, unless that is wrong
+  TimeNs imu_ns_ = 0;            ///< the newest sample
 };
 
 }  // namespace

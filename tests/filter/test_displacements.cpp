@@ -121,9 +121,9 @@ TEST_CASE("displacements: a strike among the samples makes the IMU's uncertain")
   const double before = imu_motion(x.imu, samples, kEnd, ImuCalibration{}).position_variance;
   ImuBuffer struck(256);
   for (std::size_t i = 0; i < samples.size(); ++i) {
-    ImuSample sample = samples[i];
-    if (sample.t_ns > kStart + 50'000'000 && sample.t_ns < kStart + 70'000'000) sample.accel_B.z() += 60.0;
-    struck.push(sample);
+    const ImuSample& sample = samples[i];
+    const bool strike = sample.t_ns > kStart + 50'000'000 && sample.t_ns < kStart + 70'000'000;
+    struck.push(sample, {1.0, strike ? 50.0 : 1.0});
   }
   CHECK(imu_motion(x.imu, struck, kEnd, ImuCalibration{}).position_variance > 10.0 * before);
 }

@@ -51,9 +51,12 @@ struct Drive {
       monitor.add_laser({at(t), {0.1 + 1e-3 * t, 0.2 + 1e-3 * t, 0.3 + 1e-3 * t}}, Verdict::accepted,
                         LaserCalibration{}, at(t));
       frame.t_ns = at(t);
-      monitor.add_frame(frame, records, at(t));
+      usable = monitor.check_image(frame.agreement, at(t) + stamp_error, at(t));
+      monitor.add_frame(frame, records);
     }
   }
+  bool usable = true;      ///< the last image
+  TimeNs stamp_error = 0;  ///< of the images
   void reject(Source source) {
     records[index_of(source)].used = 0;
     records[index_of(source)].rejected = 3;
@@ -201,6 +204,51 @@ TEST_CASE("health: a frozen image, a stuck beam, a gap, a clipped value, a jumpi
     drive.monitor.add_encoder({at(2.1), 0, 0}, Verdict::accepted, at(1.99));
     drive.go_on(0.05);
     CHECK(degraded_by(drive, Source::wheel_left));
+  }
+}
+
+TEST_CASE("health: images that cannot be true are not to be used") {
+  Drive drive;
+  drive.frame.agreement.matches = 100;
+  drive.go_on(2.0);
+  CHECK(drive.usable);
+  SUBCASE("one that repeats the last") {
+    drive.frame.agreement.frozen = true;
+    drive.go_on(0.05);
+    CHECK_FALSE(drive.usable);
+  }
+  SUBCASE("left and right exchanged") {
+    drive.frame.agreement.behind = 0.9;
+    drive.go_on(0.05);
+    CHECK_FALSE(drive.usable);
+  }
+  SUBCASE("a late one is, if it fits; one with a wrong stamp is not, until stamps are as before") {
+    drive.stamp_error = -200'000'000;
+    drive.go_on(0.2);
+    CHECK(drive.usable);
+    drive.frame.agreement.left = 0.9;
+    drive.go_on(0.05);
+    CHECK_FALSE(drive.usable);
+    drive.frame.agreement.left = 0.0;
+    drive.go_on(0.2);
+    CHECK_FALSE(drive.usable);
+    drive.stamp_error = 0;
+    drive.go_on(0.05);
+    CHECK(drive.usable);
+  }
+}
+
+TEST_CASE("health: cameras that turn otherwise accuse the gyroscope, but not by what their mounting feigns") {
+  for (const double feigned : {0.0, 0.05}) {
+    CAPTURE(feigned);
+    Drive drive;
+    drive.frame.agreement.matches = 100;
+    drive.frame.agreement.turn_sigma = 1e-4;
+    drive.frame.feigned_turn = feigned;
+    drive.go_on(5.0);
+    drive.frame.agreement.turn = Eigen::Vector3d(0.0, 0.0, 0.03 * 0.05);  // 0.03 rad/s
+    drive.go_on(1.0);
+    CHECK(drive.health().untrusted[index_of(Source::gyroscope)] == (feigned == 0.0));
   }
 }
 

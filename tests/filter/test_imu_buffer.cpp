@@ -1,5 +1,7 @@
 #include <doctest/doctest.h>
 
+#include <algorithm>
+
 #include "filter/imu_buffer.h"
 
 using namespace ear;
@@ -60,4 +62,26 @@ TEST_CASE("imu buffer: statistics of an interval") {
   CHECK(s.gyro_mean.x() == doctest::Approx(1.0));
   CHECK(s.gyro_spread == doctest::Approx(0.02));
   CHECK(s.accel_spread == doctest::Approx(0.5));
+}
+
+TEST_CASE("imu buffer: a piece has the larger noise of the samples at its ends; the mean rate has the largest") {
+  ImuBuffer buffer = ramp(100, 11);
+  buffer.doubt_newest(2, {5.0, 7.0});  // at 0.09 and 0.1 s
+  const auto factor = [&](TimeNs from, TimeNs to) {
+    double largest = 0.0;
+    buffer.for_each_piece(from, to,
+                          [&](const Eigen::Vector3d&, const Eigen::Vector3d&, double, const ImuNoiseFactors& noise) {
+                            largest = std::max(largest, noise.accel);
+                          });
+    return largest;
+  };
+  CHECK(factor(0, 80'000'000) == 1.0);
+  CHECK(factor(0, 81'000'000) == 7.0);
+  CHECK(factor(101'000'000, 105'000'000) == 7.0);
+  const MeanRate rate = buffer.mean_rate(40'000'000, 100'000'000);
+  CHECK(rate.gyro_B.x() == doctest::Approx(0.07));
+  CHECK(rate.noise_factor == 5.0);
+  buffer.correct_newest(Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
+  CHECK(factor(95'000'000, 100'000'000) == 7.0);
+  CHECK(factor(101'000'000, 105'000'000) == 1.0);
 }

@@ -260,7 +260,8 @@ void compare_faults(const std::vector<simulator::Options>& simulations, const st
 
 // ---- Sound sensors
 
-/// When sensors err in a simulation without faults: wheels slip, beams are lost on rough ground, lenses are covered.
+/// When sensors err in a simulation without faults: wheels slip or leave the ground, beams
+/// are lost where it is rough, lenses are covered.
 class Causes {
  public:
   explicit Causes(const simulator::Simulation& simulation) : simulation_(simulation) {
@@ -296,10 +297,11 @@ class Causes {
         return simulation_.obstruction().active(t) || simulation_.obstruction().active(t - kCause);
       case Source::wheel_left:
       case Source::wheel_right:
-        return slips(t);
+        return slips(t) || flies(t);
       case Source::beam_0:
       case Source::beam_1:
       case Source::beam_2: {
+        if (flies(t)) return true;
         const std::vector<double>& wrong = wrong_ranges_[index_of(source) - index_of(Source::beam_0)];
         const auto next = std::upper_bound(wrong.begin(), wrong.end(), t);
         return next != wrong.begin() && *std::prev(next) > t - kCause;
@@ -307,6 +309,12 @@ class Causes {
       default:
         return false;
     }
+  }
+
+  /// In the air wheels turn as they like, and the ground is far.
+  [[nodiscard]] bool flies(double t) const {
+    const TimeNs start_ns = simulation_.truth_times().front();
+    return simulation_.truth(start_ns + static_cast<TimeNs>(1e9 * t)).mode == simulator::Mode::air;
   }
 
   [[nodiscard]] bool slips(double t) const {

@@ -18,7 +18,7 @@ void replay(const simulator::Simulation& simulation, Filter& filter, const OnEst
     if (delivery.stream == simulator::SensorStream::camera && options.camera) {
       FeatureFrame frame = simulation.tracks(delivery.index);
       if (options.change) options.change(frame);
-      steps.saw_frame(delivery.arrival_ns);
+      if (filter.is_next(frame.t_ns) && filter.covers(frame.t_ns)) steps.saw_frame(delivery.arrival_ns);
       estimate(frame.t_ns, filter.process(frame));
     } else if (delivery.stream == simulator::SensorStream::imu && steps.due(delivery.arrival_ns)) {
       const TimeNs stamp_ns = filter.camera_time(simulation.imu()[delivery.index].t_ns);

@@ -1,0 +1,68 @@
+// Jumps and holes of the inertial sensors, the images and the clocks, for five seconds, on feature tracks.
+#include <doctest/doctest.h>
+
+#include <string>
+
+#include "tools/experiments/figures.h"
+#include "tools/simulator/faults.h"
+
+using namespace ear;
+using namespace ear::experiments;
+
+namespace {
+
+struct Outcome {
+  double ate = 0.0;    ///< RMSE [m]
+  double lost = 0.0;   ///< [s]
+  bool named = false;  ///< the health was not content within a second of the fault
+};
+
+constexpr double kFault = 20.0;  // [s]
+
+Outcome run(const std::string& sequence, const std::string& fault) {
+  simulator::Options options;
+  options.sequence = sequence;
+  options.seed = 831;
+  options.duration = 35.0;
+  if (!fault.empty()) options.faults = {simulator::parse_fault(fault + "@20+5")};
+  const simulator::Simulation simulation(options);
+  Outcome outcome;
+  TimeNs last_ns = 0;
+  const Figures figures = measure(simulation, simulation.calibration(), FilterConfig{}, evaluation::AlignmentKind::yaw,
+                                  [&](TimeNs t_ns, const Health& health) {
+                                    const double t = seconds_between(simulation.truth_times().front(), t_ns);
+                                    if (health.status == HealthStatus::lost)
+                                      outcome.lost += seconds_between(last_ns, t_ns);
+                                    if (t > kFault && t < kFault + 1.0)
+                                      outcome.named = outcome.named || health.untrusted.any();
+                                    last_ns = t_ns;
+                                  });
+  REQUIRE(figures.ate_rmse.has_value());
+  outcome.ate = *figures.ate_rmse;
+  return outcome;
+}
+
+}  // namespace
+
+TEST_CASE("jumps: on the ground they cost little, are announced, and nothing is lost") {
+  const double clean = run("flat1", "").ate;
+  for (const std::string fault : {"imu_bias_jump", "imu_bias_jump.gyro", "imu_bias_jump.accel", "camera_frozen",
+                                  "camera_swapped", "clock_jump.camera", "camera_late", "imu_spikes"}) {
+    CAPTURE(fault);
+    const Outcome outcome = run("flat1", fault);
+    CHECK(outcome.ate < 2.0 * clean);
+    CHECK(outcome.named);
+    CHECK(outcome.lost == 0.0);
+  }
+}
+
+TEST_CASE("jumps: in flight an image that stays is as good as none") {
+  CHECK(run("fly1", "").lost == 0.0);
+  for (const std::string fault : {"camera_frozen", "camera_swapped", "camera_dropped"}) {
+    CAPTURE(fault);
+    const Outcome outcome = run("fly1", fault);
+    CHECK(outcome.ate < 0.15);  // 5 s of inertia; standing still by a frozen image would be more than a metre
+    CHECK(outcome.named);
+    CHECK(outcome.lost > 1.0);  // it says that it knows no more
+  }
+}
