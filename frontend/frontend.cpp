@@ -140,6 +140,13 @@ const FeatureFrame& Frontend::Impl::process(const StereoFrame& frame, const Moti
   right_present_ = stereo_ && !frame.right.empty();
   if (right_present_) check_size(frame.right, cameras_[1], "right");
 
+  if (left_.shows(frame.left)) {  // no two exposures are equal: it tells nothing, and the filter will see that
+    timing = {};
+    quality.tracked = static_cast<int>(tracks_.size());
+    quality.detected = 0;
+    output_.t_ns = frame.t_ns;
+    return output_;
+  }
   Stopwatch watch;
   left_.build(frame.left);
   if (right_present_) right_.build(frame.right);

@@ -46,8 +46,8 @@ class Frontend {
   Frontend& operator=(Frontend&&) noexcept;
 
   /// Tracks the last frame's features into this one, associates them across the stereo pair, fills up with new ones.
-  /// The result is valid until the next call. A frame whose images do not fit the calibration throws
-  /// std::invalid_argument.
+  /// An image that repeats the last gives its features again, as they were. The result is valid until the next call. A
+  /// frame whose images do not fit the calibration throws std::invalid_argument.
   const FeatureFrame& process(const StereoFrame& frame, const MotionPrediction& prediction);
 
   [[nodiscard]] const ImageQuality& quality() const;

@@ -1,8 +1,20 @@
 #include "frontend/image_pyramid.h"
 
+#include <algorithm>
+
 #include <opencv2/video/tracking.hpp>
 
 namespace ear {
+
+bool ImagePyramid::shows(const ImageView& image) const {
+  if (levels_.empty() || levels_.front().width != image.width || levels_.front().height != image.height) return false;
+  const GreyLevel& base = levels_.front();
+  for (std::ptrdiff_t row = 0; row < image.height; ++row) {
+    const std::uint8_t* const pixels = image.data + row * image.stride;
+    if (!std::equal(pixels, pixels + image.width, base.origin + row * base.stride)) return false;
+  }
+  return true;
+}
 
 void ImagePyramid::build(const ImageView& image) {
   // OpenCV takes no const pixels; it only reads them.

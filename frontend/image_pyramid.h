@@ -28,6 +28,9 @@ class ImagePyramid {
   /// Copies the image and builds all levels. Memory is kept from one image to the next.
   void build(const ImageView& image);
 
+  /// Was it built from this very image, pixel for pixel?
+  [[nodiscard]] bool shows(const ImageView& image) const;
+
   [[nodiscard]] int top_level() const { return static_cast<int>(levels_.size()) - 1; }
 
   [[nodiscard]] const GreyLevel& level(int index) const { return levels_[static_cast<std::size_t>(index)]; }

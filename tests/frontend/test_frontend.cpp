@@ -254,6 +254,29 @@ TEST_CASE("front end: black, white and returning images") {
   for (const auto& feature : back.features) CHECK(first.count(feature.id) == 0);
 }
 
+TEST_CASE("front end: an image that repeats the last gives its features again, whatever is predicted") {
+  const auto cameras = test_stereo_pair();
+  Frontend frontend({kFeatures, 0.3}, cameras);
+  const cv::Mat left = Camera(cameras[0]).render(at({0, 0, 0}), {wall(2.0, 30)});
+  const cv::Mat right = Camera(cameras[1]).render(at({0, 0, 0}), {wall(2.0, 30)});
+  const FeatureFrame first = frontend.process({0, view_of(left), view_of(right)}, {});
+  REQUIRE(first.features.size() > kFeatures / 2);
+  const MotionPrediction moved = exact_motion(at({0, 0, 0}), at({0.1, 0.0, 0.0}));
+  const FeatureFrame& again = frontend.process({1, view_of(left), view_of(right)}, moved);
+  CHECK(again.t_ns == 1);
+  REQUIRE(again.features.size() == first.features.size());
+  for (std::size_t i = 0; i < first.features.size(); ++i) {
+    CHECK(again.features[i].id == first.features[i].id);
+    CHECK(again.features[i].left == first.features[i].left);
+    CHECK(again.features[i].right == first.features[i].right);
+  }
+  cv::Mat other = left.clone();
+  other.at<std::uint8_t>(0, 0) ^= 1U;
+  CHECK(frontend.timing().pyramid == 0.0);
+  frontend.process({2, view_of(other), view_of(right)}, {});
+  CHECK(frontend.timing().pyramid > 0.0);
+}
+
 TEST_CASE("front end: ids are unique in a frame and never come back, also after reset") {
   Run run({wall(2.0, 29)});
   std::set<std::uint64_t> gone;
