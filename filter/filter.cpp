@@ -328,7 +328,9 @@ std::optional<Estimate> Filter::process(const FeatureFrame& given) {
     return std::nullopt;
   }
   const FeatureFrame& frame = guard_.sound(given);
-  const bool frozen = repeats_last_image(frame);
+  const bool repeats = repeats_last_image(frame);
+  if (repeats && status_ != Status::tracking) noiseless_camera_ = true;
+  const bool frozen = repeats && !noiseless_camera_;
   const bool still = begin_frame(frame, frozen);
   FrameAgreement agreement;
   agreement.frozen = frozen;
@@ -355,7 +357,7 @@ std::optional<Estimate> Filter::process(const FeatureFrame& given) {
   return finish_frame(true, agreement);
 }
 
-/// No two exposures are exactly equal.
+/// No two exposures are exactly equal, unless they are of a simulator without noise, which shows before the start.
 bool Filter::repeats_last_image(const FeatureFrame& frame) const {
   if (!any_image_ || frame.features.size() < kFewestRepeated) return false;
   const std::vector<FeatureObservation>& last = last_features_.features;

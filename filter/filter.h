@@ -216,6 +216,7 @@ class Filter {
   TimeNs last_image_ns_ = 0;    ///< its camera stamp
   FeatureFrame last_features_;  ///< its features
   bool any_image_ = false;
+  bool noiseless_camera_ = false;   ///< its images repeat while nothing moves: that means nothing
   bool clone_is_here_ = false;      ///< the newest clone was made where the vehicle is, if it stands
   bool learn_calibration_ = false;  ///< standing tells nothing about it
   FrameStatistics statistics_;

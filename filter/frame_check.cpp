@@ -10,7 +10,6 @@ namespace ear {
 namespace {
 
 constexpr std::size_t kFewest = 8;    // features in common, for anything to be said
-constexpr double kFrozen = 1e-9;      // normalized: no two exposures agree so well
 constexpr double kLeastDepth = 1e-3;  // of a scaled point: smaller is beside or behind the camera
 
 double share(int part, int of) { return of > 0 ? static_cast<double>(part) / of : 0.0; }
@@ -29,11 +28,9 @@ FrameAgreement FrameCheck::compare(const FeatureFrame& from, const FeatureFrame&
   const double baseline = cameras.T_C0C1.p.norm();
   const double way = motion.p_B0B1.norm();
   int off_left = 0, off_right = 0, seen_right = 0, behind = 0;
-  result.frozen = true;
   Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
   Eigen::Vector3d b = Eigen::Vector3d::Zero();
   for (const StereoMatch& match : matches_) {
-    result.frozen = result.frozen && (match.left1 - match.left0).cwiseAbs().maxCoeff() < kFrozen;
     const double s = stereo_inverse_depth(cameras, match.left0, match.right0);
     // Noise of this observation and of the one that it starts from; of the depth, whose error the way makes visible;
     // of the way itself.

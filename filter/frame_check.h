@@ -23,7 +23,7 @@ struct FrameAgreement {
   double left = 0.0;    ///< share of them that are not where they were expected: left camera
   double right = 0.0;   ///< right camera
   double behind = 0.0;  ///< share of the stereo features that the geometry puts behind the cameras
-  bool frozen = false;  ///< every feature is exactly where it was
+  bool frozen = false;  ///< the image is exactly the one before; whoever compares frames finds that out first
   Eigen::Vector3d turn = Eigen::Vector3d::Zero();  ///< by which the vehicle turned more than predicted [rad], in B
   double turn_sigma = 0.0;                         ///< [rad] its standard deviation, the worst axis; 0: not known
 };
