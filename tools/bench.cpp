@@ -1,19 +1,30 @@
 // ear bench RECORDING: what the pipeline costs for each stereo frame, beside the floor measured on the same images in
-// the same run (tools/floor.h). One thread; CPU time.
-#include <algorithm>
-#include <cstdio>
+// the same run (tools/floor.h). One thread. Floor, pipeline, read and samples are CPU time of the thread; the stages
+// within the pipeline are wall time, so that they mean something on a machine that is otherwise idle.
+#include <sys/resource.h>
+
+#include <ctime>
 #include <filesystem>
+#include <fstream>
+#include <iostream>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <opencv2/core/utility.hpp>
+#include <optional>
 #include <stdexcept>
 #include <string>
+#include <utility>
+#include <variant>
 #include <vector>
 
 #include "ear/odometry.h"
 #include "src/recording/config_file.h"
 #include "src/recording/recording.h"
+#include "tools/allocation_counter.h"
+#include "tools/bench_figures.h"
 #include "tools/commands.h"
 #include "tools/floor.h"
+#include "tools/replay.h"
 
 namespace ear::tools {
 namespace {
@@ -23,109 +34,171 @@ constexpr std::size_t kWarmUp = 5;  // frames in which memory is allocated and c
 struct BenchArguments {
   std::filesystem::path recording;
   std::filesystem::path config;
+  std::filesystem::path compare;
+  bool json = false;
 };
 
-// Times of one kind, one for each frame [s].
-class Series {
+/// Adds up CPU time and allocations of the calling thread between start() and stop().
+class Meter {
  public:
-  void add(double seconds) { times_.push_back(seconds); }
+  void start() {
+    running_ = true;
+    start_seconds_ = thread_cpu_time();
+    start_allocations_ = thread_allocations();
+  }
+  void stop() {
+    if (!running_) return;
+    running_ = false;
+    seconds_ += thread_cpu_time() - start_seconds_;
+    allocations_ += thread_allocations() - start_allocations_;
+  }
+  [[nodiscard]] bool running() const { return running_; }
+  [[nodiscard]] double seconds() const { return seconds_; }  ///< up to the last stop()
 
-  [[nodiscard]] double quantile_ms(double share) const {
-    std::vector<double> rest(times_.begin() + static_cast<std::ptrdiff_t>(std::min(kWarmUp, times_.size())),
-                             times_.end());
-    if (rest.empty()) return 0.0;
-    const auto at = rest.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(rest.size() - 1));
-    std::nth_element(rest.begin(), at, rest.end());
-    return 1e3 * *at;
+  /// What was added up since the last call [s], [1].
+  std::pair<double, std::uint64_t> take() {
+    return {std::exchange(seconds_, 0.0), std::exchange(allocations_, std::uint64_t{0})};
   }
 
-  [[nodiscard]] std::size_t size() const { return times_.size(); }
-
  private:
-  std::vector<double> times_;
+  bool running_ = false;
+  double seconds_ = 0.0;
+  double start_seconds_ = 0.0;
+  std::uint64_t allocations_ = 0;
+  std::uint64_t start_allocations_ = 0;
 };
 
-struct Measured {
-  Series floor;
-  Series pipeline;
-  Series pyramid, track, reject, stereo, detect, filter;
+/// CPU time of all threads but this one: of those that decode images ahead [s].
+double other_threads_cpu_time() {
+  timespec t{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec) - thread_cpu_time();
+}
+
+/// Values of one kind, one per frame.
+class Series {
+ public:
+  void add(double value) { values_.push_back(value); }
+  [[nodiscard]] std::size_t frames() const { return values_.size() > kWarmUp ? values_.size() - kWarmUp : 0; }
+  [[nodiscard]] Distribution distribution(double factor) const {
+    std::vector<double> rest(values_.end() - static_cast<std::ptrdiff_t>(frames()), values_.end());
+    for (double& value : rest) value *= factor;
+    return distribution_of(std::move(rest));
+  }
+
+ private:
+  std::vector<double> values_;
 };
 
 class Bench {
  public:
-  Bench(const Config& config, const Calibration& calibration)
-      : odometry_(config, calibration), floor_(config.frontend.max_features) {}
+  Bench(const Config& config, Recording& recording)
+      : odometry_(config, recording.calibration()), floor_(config.frontend.max_features), recording_(recording) {}
 
-  void add(const ImuSample& sample) {
-    const double start = thread_cpu_time();
-    odometry_.add_imu(sample);
-    imu_seconds_ += thread_cpu_time() - start;
+  void run() {
+    reading_.start();
+    other_seconds_ = other_threads_cpu_time();
+    const auto before_sample = [this](const Sample& sample) {
+      reading_.stop();
+      if (const auto* frame = std::get_if<RecordedFrame>(&sample)) {
+        frame_ = *frame;  // put aside by replay() too, with a copy that a driver would not make: not measured
+        return;
+      }
+      samples_seconds_ = pipeline_.seconds();
+      pipeline_.start();
+    };
+    const auto after_sample = [this](const Sample&) {
+      pipeline_.stop();
+      reading_.start();
+    };
+    replay(
+        recording_, odometry_, [this](const ReplayedFrame& frame) { take(frame); }, before_sample, after_sample);
   }
 
-  void add(const RecordedFrame& frame) {
-    const double start = thread_cpu_time();
-    odometry_.add_stereo(frame);
-    measured_.pipeline.add(imu_seconds_ + thread_cpu_time() - start);
-    imu_seconds_ = 0.0;
-    const StageTimes stages = odometry_.stage_times();
-    measured_.pyramid.add(stages.pyramid);
-    measured_.track.add(stages.track);
-    measured_.reject.add(stages.reject);
-    measured_.stereo.add(stages.stereo);
-    measured_.detect.add(stages.detect);
-    measured_.filter.add(stages.filter);
-    measured_.floor.add(floor_.measure(frame));
+  [[nodiscard]] BenchFigures figures(const BenchArguments& args, int points) const {
+    constexpr double kMs = 1e3;
+    BenchFigures figures;
+    figures.recording = args.recording.filename().string();
+    figures.frames = pipeline_s_.frames();
+    figures.points = points;
+    figures.stages = {{"floor", floor_s_.distribution(kMs)},   {"pipeline", pipeline_s_.distribution(kMs)},
+                      {"read", read_s_.distribution(kMs)},     {"pyramid", pyramid_s_.distribution(kMs)},
+                      {"track", track_s_.distribution(kMs)},   {"reject", reject_s_.distribution(kMs)},
+                      {"stereo", stereo_s_.distribution(kMs)}, {"detect", detect_s_.distribution(kMs)},
+                      {"filter", filter_s_.distribution(kMs)}, {"samples", samples_s_.distribution(kMs)}};
+    if (counts_allocations()) figures.allocations = allocations_.distribution(1.0);
+    const double floor = figures.stage("floor").p50;
+    figures.ratio = floor > 0.0 ? figures.stage("pipeline").p50 / floor : 0.0;
+    rusage usage{};
+    getrusage(RUSAGE_SELF, &usage);
+    figures.peak_memory_mb = static_cast<double>(usage.ru_maxrss) / 1024.0;
+    return figures;
   }
-
-  [[nodiscard]] const Measured& measured() const { return measured_; }
 
  private:
+  void take(const ReplayedFrame& replayed) {
+    if (!frame_ || frame_->t_ns != replayed.t_ns || !pipeline_.running()) return;  // no image, or out of turn
+    pipeline_.stop();
+    const auto [seconds, allocations] = pipeline_.take();
+    pipeline_s_.add(seconds);
+    allocations_.add(static_cast<double>(allocations));
+
+    const StageTimes stages = odometry_.stage_times();
+    pyramid_s_.add(stages.pyramid);
+    track_s_.add(stages.track);
+    reject_s_.add(stages.reject);
+    stereo_s_.add(stages.stereo);
+    detect_s_.add(stages.detect);
+    filter_s_.add(stages.filter);
+    samples_s_.add(samples_seconds_);
+
+    const double other = other_threads_cpu_time();
+    read_s_.add(reading_.take().first + other - other_seconds_);
+    other_seconds_ = other;
+    floor_s_.add(floor_.measure(*frame_));
+    frame_.reset();
+    pipeline_.start();
+  }
+
   Odometry odometry_;
   Floor floor_;
-  Measured measured_;
-  double imu_seconds_ = 0.0;  // since the last frame
+  Recording& recording_;
+  std::optional<RecordedFrame> frame_;  // the one that replay() hands over next
+  Meter pipeline_, reading_;
+  double other_seconds_ = 0.0;
+  double samples_seconds_ = 0.0;  // since the last frame, without the sample that released it
+  Series floor_s_, pipeline_s_, read_s_, pyramid_s_, track_s_, reject_s_, stereo_s_, detect_s_, filter_s_, samples_s_;
+  Series allocations_;
 };
 
-void print(const Measured& measured, int points) {
-  const auto row = [](const char* name, const Series& series) {
-    std::printf("%-10s %8.3f %8.3f %8.3f\n", name, series.quantile_ms(0.5), series.quantile_ms(0.95),
-                series.quantile_ms(1.0));
-  };
-  std::printf("%zu stereo frames, %d points, one thread\n", measured.pipeline.size(), points);
-  std::printf("%-10s %8s %8s %8s\n", "CPU ms", "median", "95 %", "worst");
-  row("floor", measured.floor);
-  row("pipeline", measured.pipeline);
-  std::printf("ratio      %8.3f\n", measured.pipeline.quantile_ms(0.5) / measured.floor.quantile_ms(0.5));
-  std::printf("wall ms\n");
-  row("pyramid", measured.pyramid);
-  row("track", measured.track);
-  row("reject", measured.reject);
-  row("stereo", measured.stereo);
-  row("detect", measured.detect);
-  row("filter", measured.filter);
+BenchFigures read_figures(const std::filesystem::path& file) {
+  std::ifstream stream(file);
+  const nlohmann::json json = nlohmann::json::parse(stream, nullptr, false);
+  try {
+    return bench_figures_of(json);
+  } catch (const std::runtime_error& error) {
+    throw std::runtime_error(file.string() + ": " + error.what());
+  }
 }
 
 void bench(const BenchArguments& args) {
   cv::setNumThreads(1);
   const Config config = args.config.empty() ? Config{} : load_config(args.config);
+  std::optional<BenchFigures> before;  // read first: a wrong file is said at once
+  if (!args.compare.empty()) before = read_figures(args.compare);
   Recording recording(args.recording);
   if (recording.calibration().cameras.size() < 2) {
     throw std::runtime_error(args.recording.string() + ": the benchmark needs a stereo pair");
   }
-  Bench bench(config, recording.calibration());
-  std::optional<RecordedFrame> waiting;  // until the first inertial sample after it, as the images of a real camera
-  while (const auto sample = recording.next()) {
-    if (const auto* imu = std::get_if<ImuSample>(&*sample)) {
-      bench.add(*imu);
-      if (waiting && imu->t_ns >= waiting->t_ns) {
-        bench.add(*waiting);
-        waiting.reset();
-      }
-    } else if (const auto* frame = std::get_if<RecordedFrame>(&*sample)) {
-      waiting = *frame;
-    }
+  Bench bench(config, recording);
+  bench.run();
+  const BenchFigures figures = bench.figures(args, config.frontend.max_features);
+  if (args.json) {
+    std::cout << to_json(figures).dump(2) << '\n';
+  } else {
+    std::cout << table_of(figures);
   }
-  print(bench.measured(), config.frontend.max_features);
+  if (before) (args.json ? std::cerr : std::cout) << comparison_of(*before, figures);
 }
 
 }  // namespace
@@ -135,6 +208,9 @@ void add_bench_command(CLI::App& app) {
   auto args = std::make_shared<BenchArguments>();
   command->add_option("RECORDING", args->recording, "Folder in the EuRoC/ASL layout (docs/recordings.md)")->required();
   command->add_option("--config", args->config, "Settings; what it leaves out keeps its default")
+      ->check(CLI::ExistingFile);
+  command->add_flag("--json", args->json, "The figures as JSON, for --compare");
+  command->add_option("--compare", args->compare, "What --json wrote before: shows the changes since")
       ->check(CLI::ExistingFile);
   command->callback([args] { bench(*args); });
 }

@@ -10,11 +10,13 @@ namespace {
 class Replay {
  public:
   Replay(Recording& recording, Odometry& odometry, const std::function<void(const ReplayedFrame&)>& on_frame,
-         const std::function<void(const Sample&)>& before_sample)
+         const std::function<void(const Sample&)>& before_sample,
+         const std::function<void(const Sample&)>& after_sample)
       : recording_(recording),
         odometry_(odometry),
         on_frame_(on_frame),
         before_sample_(before_sample),
+        after_sample_(after_sample),
         camera_offset_ns_(static_cast<TimeNs>(1e9 * recording.calibration().camera_time_offset)),
         steps_(!recording.calibration().cameras.empty(), recording.calibration().encoder.has_value()) {}
 
@@ -22,6 +24,7 @@ class Replay {
     while (const std::optional<Sample> sample = recording_.next()) {
       if (before_sample_) before_sample_(*sample);
       std::visit([this](const auto& s) { take(s); }, *sample);
+      if (after_sample_) after_sample_(*sample);
     }
     hand_over();
   }
@@ -56,6 +59,7 @@ class Replay {
   Odometry& odometry_;
   const std::function<void(const ReplayedFrame&)>& on_frame_;
   const std::function<void(const Sample&)>& before_sample_;
+  const std::function<void(const Sample&)>& after_sample_;
   TimeNs camera_offset_ns_;
   BlindSteps steps_;
   std::unique_ptr<RecordedFrame> waiting_;
@@ -66,8 +70,9 @@ class Replay {
 }  // namespace
 
 void replay(Recording& recording, Odometry& odometry, const std::function<void(const ReplayedFrame&)>& on_frame,
-            const std::function<void(const Sample&)>& before_sample) {
-  Replay(recording, odometry, on_frame, before_sample).run();
+            const std::function<void(const Sample&)>& before_sample,
+            const std::function<void(const Sample&)>& after_sample) {
+  Replay(recording, odometry, on_frame, before_sample, after_sample).run();
 }
 
 }  // namespace ear::tools

@@ -46,6 +46,13 @@ class CommandLine(unittest.TestCase):
             self.assert_refused(ear("run", missing, "--out", Path(folder) / "out"), str(missing))
             self.assert_refused(ear("evaluate", missing, missing), str(missing))
 
+    def test_bench_compares_only_with_its_own(self):
+        with tempfile.TemporaryDirectory() as folder:
+            other = Path(folder) / "other.json"
+            for text in ("{}", "not JSON"):
+                other.write_text(text, encoding="utf-8")
+                self.assert_refused(ear("bench", folder, "--compare", other), f"{other}: not the output of ear bench")
+
     def test_check_reports_a_missing_recording(self):
         result = ear("check", "missing")  # its findings are its output, not an error of the program
         self.assertEqual(result.returncode, 2)
@@ -62,12 +69,24 @@ class EndToEnd(unittest.TestCase):
         self.assertEqual(result.returncode, 0, result)
         return result.stdout
 
+    def check_bench(self, recording, old):
+        old.write_text(self.run_ear("bench", recording, "--json"), encoding="utf-8")
+        figures = json.loads(old.read_text(encoding="utf-8"))
+        stages = {stage["name"]: stage for stage in figures["stages_ms"]}
+        self.assertGreater(figures["frames"], 150)
+        for name in ("floor", "pipeline", "read", "track", "filter", "samples"):
+            self.assertGreater(stages[name]["mean"], 0.0, name)
+        self.assertGreater(figures["peak_memory_mb"], 5.0)
+        text = self.run_ear("bench", recording, "--compare", old)
+        self.assertRegex(text, r"pipeline +\d+\.\d+ +\d+\.\d+ +[+-]\d+\.\d %")
+
     def test_from_simulation_to_report(self):
         with tempfile.TemporaryDirectory() as folder:
             recording, output, report = (Path(folder) / name for name in ("recording", "output", "report.html"))
             self.run_ear("simulate", "flat1", "--seed", "5", "--duration", "6", "--out", recording)
             self.run_ear("check", recording)
             self.run_ear("run", recording, "--out", output)
+            self.check_bench(recording, Path(folder) / "bench.json")
             evaluation = json.loads(self.run_ear("evaluate", output, recording, "--json", "--report", report))
 
             with (output / "states.csv").open(encoding="utf-8") as states:

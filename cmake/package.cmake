@@ -1,0 +1,21 @@
+# The Debian package: `cpack -G DEB` in the build folder. docs/embedding.md, section "Debian package".
+set(CPACK_PACKAGE_NAME ear-msckf)
+set(CPACK_PACKAGE_VENDOR "EAR-MSCKF")
+set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "${PROJECT_DESCRIPTION}")
+set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
+set(CPACK_STRIP_FILES ON)  # the program; the libraries are archives
+set(CPACK_GENERATOR DEB)
+
+set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
+set(CPACK_DEBIAN_PACKAGE_MAINTAINER "EAR-MSCKF developers <ear-msckf@localhost>")
+set(CPACK_DEBIAN_PACKAGE_SECTION science)
+set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)  # what the program needs to run
+set(CPACK_DEBIAN_PACKAGE_RECOMMENDS "libeigen3-dev, libopencv-dev")  # what programs that embed the library need to build
+set(CPACK_DEBIAN_PACKAGE_DESCRIPTION
+    "Estimates where a vehicle is that drives and flies, from a stereo camera, an
+IMU, wheel encoders and lasers. Holds the program ear, and the library with its
+headers for programs in C++ and C.")
+
+install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/${CPACK_PACKAGE_NAME}
+        RENAME copyright)
+include(CPack)
