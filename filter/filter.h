@@ -4,6 +4,10 @@
 // Per frame (Filter::process): propagate to the frame's time, taking in wheels and lasers on the way, each at its own
 // time; if the vehicle stands, hold it; else clone the pose, take in the frame's observations, update once with all
 // features that ended or fill the window, and make room in the window.
+//
+// filter.cpp: samples in, frames through, estimates out. filter_start.cpp: starting and starting again.
+// filter_motion.cpp: the state moves on. filter_ground.cpp: contact, wheels, lasers. filter_images.cpp: clones and
+// features.
 #pragma once
 
 #include <array>
@@ -111,13 +115,26 @@ class Filter {
 
   static constexpr TimeNs kDisagrees = -1;
 
+  // filter.cpp
   [[nodiscard]] TimeNs imu_time(TimeNs camera_time_ns) const;
   [[nodiscard]] std::optional<TimeNs> state_time() const;
+  bool begin_frame(const FeatureFrame& frame, bool frozen);
+  void compare_sensors(const FeatureFrame& frame, TimeNs t_ns);
+  [[nodiscard]] double trust(MotionSensor sensor) const;
+  [[nodiscard]] std::optional<Estimate> finish_frame(bool image, const FrameAgreement& agreement);
+  [[nodiscard]] bool possible() const;
+  [[nodiscard]] bool usable() const;
+  [[nodiscard]] bool on_ground() const { return encoder_ && contact_.mode() == ContactMode::ground; }
+  [[nodiscard]] bool sees_ground() const { return beam_count_ > 0; }  ///< are there lasers?
+  /// Nothing but the wheels' calibration tells a length: there is neither camera nor laser.
+  [[nodiscard]] bool scale_is_given() const {
+    return encoder_ && config_.online_calibration.wheels && !sees_ground() && calibration_.cameras.empty();
+  }
+  [[nodiscard]] ImuErrorMatrix ordinary_covariance() const;
+  [[nodiscard]] Estimate make_estimate() const;
+
+  // filter_start.cpp
   void restart(TimeNs t_ns, TimeNs clock_shift);
-  void mend_spike(const ImuSample& next);
-  void leave_imu_hole();
-  void doubt_motion(double rotation, double velocity, double position);
-  void watch_biases(double dt);
   bool try_start(TimeNs t_ns, const ImuStatistics& imu, bool still);
   bool try_rolling_start();
   bool try_moving_start(const FeatureFrame& frame);
@@ -127,33 +144,24 @@ class Filter {
   void stop();
   [[nodiscard]] Eigen::VectorXd start_sigma() const;
   void reset_covariance(const Eigen::VectorXd& sigma);
-  bool begin_frame(const FeatureFrame& frame, bool frozen);
-  void compare_sensors(const FeatureFrame& frame, TimeNs t_ns);
-  [[nodiscard]] Displacement displacement_by_wheels(TimeNs until_ns) const;
-  [[nodiscard]] WheelNoise wheel_noise() const;
-  [[nodiscard]] double trust(MotionSensor sensor) const;
-  [[nodiscard]] bool repeats_last_image(const FeatureFrame& frame) const;
+
+  // filter_motion.cpp
+  void mend_spike(const ImuSample& next);
+  void leave_imu_hole();
+  void doubt_motion(double rotation, double velocity, double position);
+  void watch_biases(double dt);
   [[nodiscard]] bool waits_for_bridge() const;
-  void bridge(const FeatureFrame& frame);
-  [[nodiscard]] FrameAgreement check_frame(const FeatureFrame& frame);
-  void go_on_blind(bool still);
-  void use_image(const FeatureFrame& frame, bool still);
-  [[nodiscard]] std::optional<Estimate> finish_frame(bool image, const FrameAgreement& agreement);
   [[nodiscard]] NavState predict_here(TimeNs t_ns) const;
-  [[nodiscard]] bool possible() const;
-  [[nodiscard]] bool usable() const;
   void advance(TimeNs t_ns);
   void advance_measuring(TimeNs t_ns);
   [[nodiscard]] Motion motion_at(TimeNs t_ns) const;
+  void update(const Eigen::Ref<const Eigen::MatrixXd>& H, int first_column, const Eigen::Ref<const Eigen::VectorXd>& r);
+
+  // filter_ground.cpp
+  [[nodiscard]] Displacement displacement_by_wheels(TimeNs until_ns) const;
+  [[nodiscard]] WheelNoise wheel_noise() const;
   void log_wheels(const WheelRows& rows, const Eigen::Matrix<double, WheelRows::size, 1>& sigma, TimeNs t_ns);
-  void log_features();
   void note_contact(ContactEvent event);
-  [[nodiscard]] bool on_ground() const { return encoder_ && contact_.mode() == ContactMode::ground; }
-  [[nodiscard]] bool sees_ground() const { return beam_count_ > 0; }  ///< are there lasers?
-  /// Nothing but the wheels' calibration tells a length: there is neither camera nor laser.
-  [[nodiscard]] bool scale_is_given() const {
-    return encoder_ && config_.online_calibration.wheels && !sees_ground() && calibration_.cameras.empty();
-  }
   [[nodiscard]] bool rolls_at(TimeNs t_ns) const;
   static bool agrees_again(TimeNs& since_ns, bool passes, TimeNs t_ns);
   void update_with_wheels(const WheelTurn& turn);
@@ -163,6 +171,14 @@ class Filter {
   void update_with_displacement();
   void update_with_beams(const BeamRanges& reading);
   void restart_ground(const BeamRanges& reading, const Eigen::Matrix3d& R_WB);
+
+  // filter_images.cpp
+  [[nodiscard]] bool repeats_last_image(const FeatureFrame& frame) const;
+  void bridge(const FeatureFrame& frame);
+  [[nodiscard]] FrameAgreement check_frame(const FeatureFrame& frame);
+  void go_on_blind(bool still);
+  void use_image(const FeatureFrame& frame, bool still);
+  void log_features();
   void hold_still();
   void append_clone();
   void make_room(std::optional<std::size_t> leaving);
@@ -172,10 +188,7 @@ class Filter {
   void select_tracks(const FeatureFrame& frame, std::optional<std::uint64_t> leaving);
   [[nodiscard]] std::optional<std::size_t> clone_to_leave() const;
   [[nodiscard]] double median_parallax_px(const Clone& from, const Clone& to) const;
-  void update(const Eigen::Ref<const Eigen::MatrixXd>& H, int first_column, const Eigen::Ref<const Eigen::VectorXd>& r);
   [[nodiscard]] int clone_index(std::uint64_t frame) const;
-  [[nodiscard]] ImuErrorMatrix ordinary_covariance() const;
-  [[nodiscard]] Estimate make_estimate() const;
 
   FilterConfig config_;
   Calibration calibration_;

@@ -1,0 +1,286 @@
+// Filter: what is done with a frame: bridges, standing still, clones, features.
+#include "filter/filter.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "filter/relative_motion.h"
+
+namespace ear {
+namespace {
+
+constexpr double kBridgeRotation = 2e-3;     // [rad] standard deviations with which two images tell of the motion:
+constexpr double kBridgePosition = 5e-3;     // [m] well above what the features will tell later
+constexpr std::size_t kFewestRepeated = 8;   // features, for two images to be the same
+constexpr double kOldImage = 0.5;            // [s] after which frames have little in common
+constexpr double kCommonShare = 0.5;         // of its features, that the elder of a copy must have seen
+constexpr std::size_t kMinObservations = 2;  // clones that must have seen a feature
+
+}  // namespace
+
+/// No two exposures are exactly equal, unless they are of a simulator without noise, which shows before the start.
+bool Filter::repeats_last_image(const FeatureFrame& frame) const {
+  if (!any_image_ || frame.features.size() < kFewestRepeated) return false;
+  const std::vector<FeatureObservation>& last = last_features_.features;
+  std::size_t common = 0;
+  std::size_t equal = 0;
+  for (std::size_t i = 0; i < std::min(frame.features.size(), last.size()); ++i) {
+    if (frame.features[i].id != last[i].id) continue;
+    ++common;
+    equal += frame.features[i].left == last[i].left ? 1 : 0;
+  }
+  return common >= kFewestRepeated && equal == common;
+}
+
+/// Where the inertial samples since the last image may be wrong by more than noise (clipped, missing, stamps that
+/// jumped), the two images tell how the body moved, roughly: later, the features of both will tell it in full, around a
+/// state that is near enough to be linear. docs/filter.md, section 15.
+void Filter::bridge(const FeatureFrame& frame) {
+  const bool needed = imu_doubtful_;
+  imu_doubtful_ = false;
+  if (!needed || !any_image_ || calibration_.cameras.size() < 2 || state_.clones.empty()) return;
+  match_stereo(last_features_, frame, bridge_matches_);
+  StereoMotion start;
+  start.R_B0B1 = image_T_WB_.R.transpose() * state_.imu.R_WB;
+  start.p_B0B1 = image_T_WB_.R.transpose() * (state_.imu.p_WB - image_T_WB_.p);
+  const std::optional<StereoMotion> motion =
+      stereo_motion(bridge_matches_, state_.camera, start, config_.feature_sigma_px / focal_px_);
+  if (!motion) return;
+  const int newest = static_cast<int>(state_.clones.size()) - 1;
+  const RelativeMotionRows rows = linearize_relative_motion(state_, newest, {motion->R_B0B1, motion->p_B0B1});
+  const Eigen::Matrix3d R_WB0 = state_.clones.back().T_WB.R;
+  const Eigen::Matrix3d covariance =
+      R_WB0 * motion->covariance * R_WB0.transpose() + kBridgePosition * kBridgePosition * Eigen::Matrix3d::Identity();
+  const Eigen::LLT<Eigen::Matrix3d> llt(covariance);
+  const int clone = err::clone(newest);
+  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(6, clone + err::clone_size);
+  H.topLeftCorner<3, err::imu_size>() = rows.H.topRows<3>() / kBridgeRotation;
+  H.topRightCorner<3, err::clone_size>() = rows.H_clone.topRows<3>() / kBridgeRotation;
+  H.bottomLeftCorner<3, err::imu_size>() = llt.matrixL().solve(rows.H.bottomRows<3>());
+  H.bottomRightCorner<3, err::clone_size>() = llt.matrixL().solve(rows.H_clone.bottomRows<3>());
+  Eigen::Matrix<double, 6, 1> r;
+  r << rows.residual.head<3>() / kBridgeRotation, llt.matrixL().solve(rows.residual.tail<3>());
+  learn_calibration_ = false;
+  update(H, 0, r);
+}
+
+/// At the state's time, which is the frame's, before the frame changes it: does it show the motion since the last image
+/// that the other sensors predict?
+FrameAgreement Filter::check_frame(const FeatureFrame& frame) {
+  const double dt = seconds_between(last_image_ns_, frame.t_ns);
+  if (!any_image_ || dt > kOldImage || calibration_.cameras.size() < 2) return FrameAgreement{};
+  PredictedMotion motion;
+  motion.R_B0B1 = image_T_WB_.R.transpose() * state_.imu.R_WB;
+  motion.p_B0B1 = image_T_WB_.R.transpose() * (state_.imu.p_WB - image_T_WB_.p);
+  const auto P = covariance_.matrix();
+  motion.sigma_p = dt * std::sqrt(P.diagonal().segment<3>(err::nu).maxCoeff());
+  return frame_check_.compare(last_features_, frame, motion, state_.camera);
+}
+
+/// The state is at the frame's time.
+void Filter::use_image(const FeatureFrame& frame, bool still) {
+  if (still && clone_is_here_) {
+    hold_still();
+  } else {
+    update_with_displacement();
+    append_clone();
+    start_displacement();
+    tracks_.add(state_.clones.back().frame, frame.features);
+    const std::optional<std::size_t> leaving = clone_to_leave();
+    update_with_features(frame, leaving);
+    make_room(leaving);
+  }
+  statistics_.clones = static_cast<int>(state_.clones.size());
+}
+
+/// At a frame's time, from all but the images.
+void Filter::go_on_blind(bool still) {
+  if (still && clone_is_here_) {
+    hold_still();
+  } else if (still) {
+    append_clone();
+    make_room(clone_to_leave());
+  } else {
+    clone_is_here_ = false;
+  }
+  statistics_.clones = static_cast<int>(state_.clones.size());
+}
+
+/// The vehicle is where it was at the newest clone, and its velocity is zero. docs/filter.md, section 4.
+void Filter::hold_still() {
+  statistics_.standing = true;
+  const StandstillConfig& still = config_.standstill;
+  const ImuState& x = state_.imu;
+  const int newest = static_cast<int>(state_.clones.size()) - 1;
+  const RelativeMotionRows rows = linearize_relative_motion(state_, newest, Pose{});
+  const int columns = err::clone(newest) + err::clone_size;
+  const Eigen::Matrix3d I = Eigen::Matrix3d::Identity();
+  Eigen::Matrix<double, 6, 1> weight;
+  weight << Eigen::Vector3d::Constant(1.0 / still.rotation_sigma),
+      Eigen::Vector3d::Constant(1.0 / still.position_sigma);
+  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(9, columns);
+  Eigen::Matrix<double, 9, 1> r;
+  H.topLeftCorner<6, err::imu_size>() = weight.asDiagonal() * rows.H;
+  H.topRightCorner<6, err::clone_size>() = weight.asDiagonal() * rows.H_clone;
+  r.head<6>() = weight.asDiagonal() * rows.residual;
+  H.block<3, 3>(6, err::theta) = -skew(x.v_W) / still.velocity_sigma;
+  H.block<3, 3>(6, err::nu) = I / still.velocity_sigma;
+  r.segment<3>(6) = -x.v_W / still.velocity_sigma;
+  learn_calibration_ = false;
+  update(H, 0, r);
+}
+
+void Filter::append_clone() {
+  const ImuState& x = state_.imu;
+  const Eigen::Vector3d rate_W = x.R_WB * rate_B_;
+  Eigen::Matrix<double, 6, err::imu_size> J_imu = Eigen::Matrix<double, 6, err::imu_size>::Zero();
+  J_imu.block<3, 3>(0, err::theta).setIdentity();
+  J_imu.block<3, 3>(3, err::rho).setIdentity();
+  Eigen::Matrix<double, 6, 1> J_offset;  // the frame was taken a moment later than thought: the vehicle moved on
+  J_offset << rate_W, x.v_W + x.p_WB.cross(rate_W);
+  covariance_.append_clone(J_imu, J_offset);
+  state_.clones.push_back({next_frame_++, {x.R_WB, x.p_WB}, 1.0 / trust(MotionSensor::camera)});
+  learn_calibration_ = !monitor_.health().untrusted[index_of(Source::camera_left)];
+  clone_is_here_ = true;
+}
+
+void Filter::make_room(std::optional<std::size_t> leaving) {
+  if (!leaving) return;
+  tracks_.forget_frame(state_.clones[*leaving].frame);
+  covariance_.remove(err::clone(static_cast<int>(*leaving)), err::clone_size);
+  state_.clones.erase(state_.clones.begin() + static_cast<std::ptrdiff_t>(*leaving));
+}
+
+void Filter::update_with_features(const FeatureFrame& frame, std::optional<std::size_t> leaving) {
+  const bool oldest_leaves = leaving && *leaving == 0;
+  select_tracks(frame, oldest_leaves ? std::optional(state_.clones.front().frame) : std::nullopt);
+
+  information_.start(state_.error_size());
+  camera_squares_.fill(0.0);
+  camera_observations_.fill(0);
+  camera_poses(state_, cameras_);
+  for (const std::size_t i : selected_) {
+    ++(add_track(tracks_[i]) ? statistics_.features_used : statistics_.features_rejected);
+    tracks_[i].observations.clear();  // each observation is used once
+  }
+  log_features();
+  information_.compress();
+  if (information_.residual().size() > 0) update(information_.H(), err::camera, information_.residual());
+
+  // Features that ended, used or not, are forgotten.
+  tracks_.keep_if([&](const Track& track) {
+    return !track.observations.empty() && std::binary_search(frame_ids_.begin(), frame_ids_.end(), track.id);
+  });
+}
+
+/// What both cameras saw of this frame's features, against where they were found to be.
+void Filter::log_features() {
+  for (std::size_t camera = 0; camera < calibration_.cameras.size(); ++camera) {
+    if (camera_observations_[camera] == 0) continue;
+    SourceLog::Features features;
+    features.used = statistics_.features_used;
+    features.rejected = statistics_.features_rejected;
+    features.rms_px = std::sqrt(camera_squares_[camera] / camera_observations_[camera]);
+    features.variance_px2 = config_.feature_sigma_px * config_.feature_sigma_px;
+    log_.add(camera == 0 ? Source::camera_left : Source::camera_right, features, gate_(1), state_.imu.t_ns);
+  }
+}
+
+/// Tracks that ended with this frame, and those that reach back to the clone that leaves; the longest first.
+void Filter::select_tracks(const FeatureFrame& frame, std::optional<std::uint64_t> leaving) {
+  frame_ids_.clear();
+  for (const FeatureObservation& feature : frame.features) frame_ids_.push_back(feature.id);
+  std::sort(frame_ids_.begin(), frame_ids_.end());
+  selected_.clear();
+  for (std::size_t i = 0; i < tracks_.size(); ++i) {
+    const Track& track = tracks_[i];
+    if (track.observations.size() < kMinObservations) continue;
+    const bool ended = !std::binary_search(frame_ids_.begin(), frame_ids_.end(), track.id);
+    const bool fills_window = leaving && track.observations.front().frame == *leaving;
+    if (ended || fills_window) selected_.push_back(i);
+  }
+  const auto longer = [&](std::size_t a, std::size_t b) {
+    return tracks_[a].observations.size() > tracks_[b].observations.size();
+  };
+  std::stable_sort(selected_.begin(), selected_.end(), longer);
+  const auto limit = static_cast<std::size_t>(config_.max_track_updates);
+  if (selected_.size() > limit) selected_.resize(limit);
+}
+
+bool Filter::add_track(const Track& track) {
+  sightings_.clear();
+  const auto camera = [&](int clone, int which) { return cameras_[static_cast<std::size_t>(2 * clone + which)]; };
+  for (const TrackObservation& o : track.observations) {
+    const int clone = clone_index(o.frame);
+    const CameraPose& left = camera(clone, 0);
+    sightings_.push_back({left.R_CW, left.p_WC, o.left});
+    if (!o.has_right) continue;
+    const CameraPose& right = camera(clone, 1);
+    sightings_.push_back({right.R_CW, right.p_WC, o.right});
+  }
+  const std::optional<InverseDepthPoint> point = triangulate(sightings_);
+  if (!point) return false;
+  observations_.clear();
+  for (const TrackObservation& o : track.observations) {
+    const int clone = clone_index(o.frame);
+    add_observation(clone, 0, *point, o.left);
+    if (o.has_right) add_observation(clone, 1, *point, o.right);
+  }
+  return information_.add(observations_, config_.feature_sigma_px / focal_px_,
+                          config_.huber_px / config_.feature_sigma_px, covariance_.matrix(), gate_);
+}
+
+void Filter::add_observation(int clone, std::size_t camera, const InverseDepthPoint& point, const Eigen::Vector2d& uv) {
+  observations_.push_back(linearize_observation(state_, clone, static_cast<int>(camera), point, uv));
+  camera_squares_[camera] += focal_px_ * focal_px_ * observations_.back().residual.squaredNorm();
+  camera_observations_[camera] += 2;
+}
+
+/// With a full window, the clone before the newest goes if it shows little that its elder does not; else the oldest.
+/// Turning on the spot thus fills no window with copies. Where all of the window shows one place, as while a vehicle
+/// shakes on its legs, there is nothing to keep, and the oldest goes: tracks are only used when they end or it leaves.
+std::optional<std::size_t> Filter::clone_to_leave() const {
+  const std::size_t n = state_.clones.size();
+  if (n <= static_cast<std::size_t>(config_.window)) return std::nullopt;
+  const auto same_place = [&](const Clone& a, const Clone& b) {
+    return median_parallax_px(a, b) < config_.keyframe_parallax_px;
+  };
+  const bool copy = same_place(state_.clones[n - 3], state_.clones[n - 2]);
+  return copy && !same_place(state_.clones.front(), state_.clones.back()) ? n - 2 : 0;
+}
+
+/// Median over the common features of how far they moved, the rotation taken out [px]. Infinite where they are few: a
+/// clone that most of today's features never saw is no elder of theirs, however little the vehicle moved.
+double Filter::median_parallax_px(const Clone& from, const Clone& to) const {
+  const Eigen::Matrix3d R_C0B = state_.camera.T_BC0.R.transpose();
+  const Eigen::Matrix3d R_to_from = R_C0B * to.T_WB.R.transpose() * from.T_WB.R * R_C0B.transpose();
+  parallax_.clear();
+  std::size_t seen = 0;  // features in `to`
+  for (const Track& track : tracks_) {
+    const TrackObservation* a = nullptr;
+    const TrackObservation* b = nullptr;
+    for (const TrackObservation& o : track.observations) {
+      if (o.frame == from.frame) a = &o;
+      if (o.frame == to.frame) b = &o;
+    }
+    seen += b != nullptr ? 1 : 0;
+    if (a == nullptr || b == nullptr) continue;
+    const Eigen::Vector3d turned = R_to_from * a->left.homogeneous();
+    parallax_.push_back(focal_px_ * (b->left - turned.hnormalized()).norm());
+  }
+  if (static_cast<double>(parallax_.size()) < kCommonShare * static_cast<double>(seen) || parallax_.empty()) {
+    return std::numeric_limits<double>::infinity();
+  }
+  const auto middle = parallax_.begin() + static_cast<std::ptrdiff_t>(parallax_.size() / 2);
+  std::nth_element(parallax_.begin(), middle, parallax_.end());
+  return *middle;
+}
+
+int Filter::clone_index(std::uint64_t frame) const {
+  const auto clone = std::lower_bound(state_.clones.begin(), state_.clones.end(), frame,
+                                      [](const Clone& c, std::uint64_t f) { return c.frame < f; });
+  return static_cast<int>(clone - state_.clones.begin());
+}
+
+}  // namespace ear
