@@ -119,7 +119,6 @@ TEST_CASE("frame check: the right motion fits, a wrong one does not") {
   CHECK(right.left < 0.05);
   CHECK(right.right < 0.05);
   CHECK(right.behind == 0.0);
-  CHECK_FALSE(right.frozen);
   CHECK(right.turn.norm() < 5.0 * right.turn_sigma);
   const FrameAgreement wrong =
       check.compare(pair.from, pair.to, {Eigen::Matrix3d::Identity(), Eigen::Vector3d::Zero(), 0.0}, cameras());
@@ -139,11 +138,9 @@ TEST_CASE("frame check: what turns a little more than predicted shows in the tur
   CHECK((mean - more).norm() < 2e-4);
 }
 
-TEST_CASE("frame check: frozen and swapped images are seen at once") {
+TEST_CASE("frame check: swapped images are seen at once") {
   Pair pair = look(Eigen::Matrix3d::Identity(), Eigen::Vector3d::Zero(), kSigma, 6);
   FrameCheck check(kSigma, kGate);
-  CHECK_FALSE(check.compare(pair.from, pair.to, {}, cameras()).frozen);
-  CHECK(check.compare(pair.from, pair.from, {}, cameras()).frozen);
   for (FeatureFrame* frame : {&pair.from, &pair.to}) {
     for (FeatureObservation& o : frame->features) std::swap(o.left, o.right);
   }
