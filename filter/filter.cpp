@@ -180,8 +180,8 @@ std::optional<Estimate> Filter::process(const FeatureFrame& given) {
     } else {
       go_on_blind(still);
     }
+    watch_biases(seconds_between(watched_ns_, state_.imu.t_ns));
   }
-  if (status_ == Status::tracking) watch_biases(seconds_between(watched_ns_, state_.imu.t_ns));
   watched_ns_ = state_.imu.t_ns;
   if (usable) {
     any_image_ = true;
@@ -254,9 +254,7 @@ std::optional<Estimate> Filter::process_without_image(TimeNs t_ns) {
   FeatureFrame nothing;
   nothing.t_ns = t_ns;
   const bool still = begin_frame(nothing, false);
-  if (status_ != Status::tracking) return finish_frame(false, FrameAgreement{});
-
-  go_on_blind(still);
+  if (status_ == Status::tracking) go_on_blind(still);
   return finish_frame(false, FrameAgreement{});
 }
 
@@ -274,10 +272,11 @@ bool Filter::begin_frame(const FeatureFrame& frame, bool frozen) {
   const TimeNs t_ns = imu_time(frame.t_ns);
   const bool started = status_ == Status::tracking;
   const ImuStatistics imu = imu_.statistics(t_ns - static_cast<TimeNs>(1e9 * config_.standstill.duration), t_ns);
-  const bool still = standstill_.update(frozen ? FeatureFrame{frame.t_ns, {}} : frame, imu,
-                                        started ? state_.imu.b_g : Eigen::Vector3d::Zero(),
-                                        started ? config_.standstill.max_gyro : config_.standstill.max_gyro_at_start,
-                                        on_ground() ? wheel_rest_.duration(t_ns, kWheelAge) : std::nullopt);
+  const FeatureFrame nothing{frame.t_ns, {}};
+  const bool still =
+      standstill_.update(frozen ? nothing : frame, imu, started ? state_.imu.b_g : Eigen::Vector3d::Zero(),
+                         started ? config_.standstill.max_gyro : config_.standstill.max_gyro_at_start,
+                         on_ground() ? wheel_rest_.duration(t_ns, kWheelAge) : std::nullopt);
   contact_.set_gyro_bias(state_.imu.b_g);
   statistics_.on_ground = on_ground();
   if (started) {

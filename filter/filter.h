@@ -174,6 +174,7 @@ class Filter {
 
   // filter_images.cpp
   [[nodiscard]] bool repeats_last_image(const FeatureFrame& frame) const;
+  [[nodiscard]] Pose motion_since_image() const;
   void bridge(const FeatureFrame& frame);
   [[nodiscard]] FrameAgreement check_frame(const FeatureFrame& frame);
   void go_on_blind(bool still);

@@ -33,6 +33,12 @@ bool Filter::repeats_last_image(const FeatureFrame& frame) const {
   return common >= kFewestRepeated && equal == common;
 }
 
+/// The body now, in the body at the last image.
+Pose Filter::motion_since_image() const {
+  const Eigen::Matrix3d R_BW = image_T_WB_.R.transpose();
+  return {R_BW * state_.imu.R_WB, R_BW * (state_.imu.p_WB - image_T_WB_.p)};
+}
+
 /// Where the inertial samples since the last image may be wrong by more than noise (clipped, missing, stamps that
 /// jumped), the two images tell how the body moved, roughly: later, the features of both will tell it in full, around a
 /// state that is near enough to be linear. docs/filter.md, section 15.
@@ -41,9 +47,10 @@ void Filter::bridge(const FeatureFrame& frame) {
   imu_doubtful_ = false;
   if (!needed || !any_image_ || calibration_.cameras.size() < 2 || state_.clones.empty()) return;
   match_stereo(last_features_, frame, bridge_matches_);
+  const Pose moved = motion_since_image();
   StereoMotion start;
-  start.R_B0B1 = image_T_WB_.R.transpose() * state_.imu.R_WB;
-  start.p_B0B1 = image_T_WB_.R.transpose() * (state_.imu.p_WB - image_T_WB_.p);
+  start.R_B0B1 = moved.R;
+  start.p_B0B1 = moved.p;
   const std::optional<StereoMotion> motion =
       stereo_motion(bridge_matches_, state_.camera, start, config_.feature_sigma_px / focal_px_);
   if (!motion) return;
@@ -70,11 +77,9 @@ void Filter::bridge(const FeatureFrame& frame) {
 FrameAgreement Filter::check_frame(const FeatureFrame& frame) {
   const double dt = seconds_between(last_image_ns_, frame.t_ns);
   if (!any_image_ || dt > kOldImage || calibration_.cameras.size() < 2) return FrameAgreement{};
-  PredictedMotion motion;
-  motion.R_B0B1 = image_T_WB_.R.transpose() * state_.imu.R_WB;
-  motion.p_B0B1 = image_T_WB_.R.transpose() * (state_.imu.p_WB - image_T_WB_.p);
-  const auto P = covariance_.matrix();
-  motion.sigma_p = dt * std::sqrt(P.diagonal().segment<3>(err::nu).maxCoeff());
+  const Pose moved = motion_since_image();
+  const double sigma_v = std::sqrt(covariance_.matrix().diagonal().segment<3>(err::nu).maxCoeff());
+  const PredictedMotion motion{moved.R, moved.p, dt * sigma_v};
   return frame_check_.compare(last_features_, frame, motion, state_.camera);
 }
 

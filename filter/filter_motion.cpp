@@ -31,7 +31,7 @@ void Filter::mend_spike(const ImuSample& next) {
   const bool gyro = spike(before.gyro_B, suspect.gyro_B, next.gyro_B, kGyroSpike);
   const bool accel = spike(before.accel_B, suspect.accel_B, next.accel_B, kAccelSpike);
   if (!gyro && !accel) return;
-  monitor_.add_spike(gyro, accel, next.t_ns);
+  monitor_.accuse_imu(gyro, accel, next.t_ns);
   imu_.correct_newest(0.5 * (before.gyro_B + next.gyro_B), 0.5 * (before.accel_B + next.accel_B));
   guard_.count_spike();
 }
@@ -156,7 +156,7 @@ void Filter::watch_biases(double dt) {
   Eigen::Matrix<double, 6, 1> sigma;
   sigma << Eigen::Vector3d::Constant(gyro), Eigen::Vector3d::Constant(accel);
   covariance_.widen(err::b_g, sigma.cwiseAbs2().asDiagonal().toDenseMatrix());
-  monitor_.add_bias_jump(jumped.gyro, jumped.accel, state_.imu.t_ns);
+  monitor_.accuse_imu(jumped.gyro, jumped.accel, state_.imu.t_ns);
 }
 
 NavState Filter::predict_here(TimeNs t_ns) const {

@@ -124,7 +124,7 @@ void HealthMonitor::add_imu(const ImuSample& sample, double max_gap) {
   note_silence(t_ns);
 }
 
-void HealthMonitor::add_spike(bool gyro, bool accel, TimeNs t_ns) {
+void HealthMonitor::accuse_imu(bool gyro, bool accel, TimeNs t_ns) {
   if (gyro) accuse({Source::gyroscope}, t_ns);
   if (accel) accuse({Source::accelerometer}, t_ns);
 }

@@ -62,8 +62,8 @@ class HealthMonitor {
   void add_imu(const ImuSample& sample, double max_gap);
   /// One whose stamp or values cannot be.
   void add_refused_imu();
-  void add_spike(bool gyro, bool accel, TimeNs t_ns);
-  void add_bias_jump(bool gyro, bool accel, TimeNs t_ns) { add_spike(gyro, accel, t_ns); }
+  /// What only a fault of the sensor does: a spike, a bias that jumps.
+  void accuse_imu(bool gyro, bool accel, TimeNs t_ns);
   /// A reading, used or refused, and the stamp of the newest inertial sample.
   void add_encoder(const EncoderSample& sample, Verdict verdict, TimeNs imu_ns);
   void add_laser(const LaserSample& sample, Verdict verdict, const LaserCalibration& lasers, TimeNs imu_ns);
