@@ -92,6 +92,20 @@ TEST_CASE("impact: a spike of the gyroscope is one of the gyroscope") {
   CHECK(factors.accel == 1.0);
 }
 
+TEST_CASE("impact: many strikes do not make a strike ordinary") {
+  Stream stream;
+  for (int i = 0; i < 100; ++i) stream.add(0.0);
+  const double gyro_sigma = make_imu().gyro_noise * std::sqrt(kRate);
+  for (int jolt = 0; jolt < 40; ++jolt) {
+    for (int i = 0; i < 3; ++i) {
+      ImuSample sample = stream.sample(Eigen::Vector3d::Zero());
+      sample.gyro_B.x() += i == 0 ? 8.7 : -8.7 + 0.01 * i;
+      CHECK(stream.add(sample).gyro * gyro_sigma > 7.0);
+    }
+    for (int i = 0; i < 12; ++i) stream.add(0.0);
+  }
+}
+
 TEST_CASE("impact: a flat top is clipped; once seen, its level is known") {
   const double limit = 4.0 * kGravity;
   Stream stream;
