@@ -73,6 +73,28 @@ bool Filter::covers(TimeNs t_ns) const {
 }
 
 void Filter::add_imu(const ImuSample& sample) {
+  clocks_.imu.add(sample);
+  take_waiting_imu();
+}
+
+void Filter::hear(ImuClock::Stream stream, TimeNs t_ns) {
+  const int mended = clocks_.imu.leaps_mended();
+  clocks_.imu.hear(stream, t_ns);
+  take_waiting_imu();
+  if (clocks_.imu.leaps_mended() != mended) monitor_.accuse_imu(true, true, imu_.newest().t_ns);
+}
+
+void Filter::take_waiting_imu() {
+  while (const std::optional<ImuSample> sample = clocks_.imu.next()) take_imu(*sample);
+}
+
+/// The newest inertial sample, where that tells the time: not while its clock is in doubt.
+std::optional<TimeNs> Filter::now() const {
+  if (imu_.empty() || clocks_.imu.waiting() || guard_.refuses_imu()) return std::nullopt;
+  return imu_.newest().t_ns;
+}
+
+void Filter::take_imu(const ImuSample& sample) {
   const ImuVerdict verdict = guard_.judge(sample);
   if (!verdict.accepted) {
     monitor_.add_refused_imu();
@@ -98,9 +120,13 @@ std::optional<TimeNs> Filter::state_time() const {
   return status_ == Status::tracking ? std::optional(state_.imu.t_ns) : std::nullopt;
 }
 
-void Filter::add_encoder(const EncoderSample& sample) {
+void Filter::add_encoder(const EncoderSample& given) {
   if (!encoder_) return;
-  const Verdict verdict = guard_.judge(sample, state_time(), *encoder_);
+  hear(ImuClock::Stream::encoder, given.t_ns);
+  EncoderSample sample = given;
+  const std::optional<TimeNs> stamp = clocks_.encoder.correct(given.t_ns, now());
+  if (stamp) sample.t_ns = *stamp;
+  const Verdict verdict = stamp ? guard_.judge(sample, state_time(), *encoder_) : guard_.refuse_encoder();
   if (!imu_.empty()) monitor_.add_encoder(sample, verdict, imu_.newest().t_ns);
   if (verdict != Verdict::accepted) return;
   note_contact(contact_.add_encoder(sample));
@@ -118,6 +144,7 @@ void Filter::add_encoder(const EncoderSample& sample) {
 
 void Filter::add_laser(const LaserSample& sample) {
   if (!encoder_ || beam_count_ == 0) return;
+  hear(ImuClock::Stream::laser, sample.t_ns);
   const Verdict verdict = guard_.judge(sample, state_time());
   if (!imu_.empty()) monitor_.add_laser(sample, verdict, *calibration_.lasers, imu_.newest().t_ns);
   if (verdict != Verdict::accepted) return;
@@ -132,6 +159,14 @@ void Filter::add_laser(const LaserSample& sample) {
   reading.t_ns = sample.t_ns;
   std::copy(sample.range.begin(), sample.range.end(), reading.range.begin());
   ranges_.push(reading);
+}
+
+std::optional<TimeNs> Filter::common_stamp(TimeNs camera_stamp_ns) {
+  hear(ImuClock::Stream::camera, camera_stamp_ns);
+  if (!is_time(camera_stamp_ns)) return camera_stamp_ns;
+  const std::optional<TimeNs> stamp = clocks_.camera.correct(camera_stamp_ns, now());
+  if (!stamp) monitor_.accuse_cameras(imu_.newest().t_ns);
+  return stamp;
 }
 
 std::optional<RelativeMotion> Filter::motion_to(TimeNs t_ns) const {
@@ -234,6 +269,13 @@ bool Filter::possible() const {
                       o.wheel_radius.allFinite() && std::isfinite(o.wheel_separation) && o.T_BO.R.allFinite() &&
                       state_.ground.n_W.allFinite() && P.allFinite();
   return finite && P.diagonal().minCoeff() >= 0.0;
+}
+
+InputCounts Filter::input_counts() const {
+  InputCounts counts = guard_.counts();
+  counts.clock_leaps =
+      static_cast<std::uint64_t>(clocks_.imu.leaps_mended() + clocks_.encoder.leaps() + clocks_.camera.leaps());
+  return counts;
 }
 
 void Filter::refuse_frame() {

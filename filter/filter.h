@@ -30,12 +30,14 @@
 #include "filter/health_monitor.h"
 #include "filter/impact_guard.h"
 #include "filter/imu_buffer.h"
+#include "filter/imu_clock.h"
 #include "filter/input_guard.h"
 #include "filter/moving_start.h"
 #include "filter/ring.h"
 #include "filter/source_log.h"
 #include "filter/standstill.h"
 #include "filter/state.h"
+#include "filter/stream_clock.h"
 #include "filter/tracks.h"
 #include "filter/wheel_agreement.h"
 #include "filter/wheel_preintegration.h"
@@ -69,6 +71,10 @@ class Filter {
   /// the start only the rotation is known. Nothing if no frame came yet, or no samples.
   [[nodiscard]] std::optional<RelativeMotion> motion_to(TimeNs t_ns) const;
 
+  /// A camera's stamp by the common clock, should the camera's own have leapt; nothing for a frame that is not to be
+  /// used, as this is not known yet. For who has the stamps as the driver gives them, once for each frame as it comes.
+  [[nodiscard]] std::optional<TimeNs> common_stamp(TimeNs camera_stamp_ns);
+
   /// Takes the features of one frame. The estimate at the frame's time, or nothing while it cannot start. Features that
   /// are not finite, that no camera can see, or that come twice are left out and counted.
   std::optional<Estimate> process(const FeatureFrame& frame);
@@ -85,11 +91,9 @@ class Filter {
   [[nodiscard]] const Health& health() const { return monitor_.health(); }
   /// Tells the health of a frame that no inertial samples reach.
   void refuse_frame();
-  [[nodiscard]] const InputCounts& input_counts() const {
-    return guard_.counts();
-  }                                               ///< of samples; frames are the caller's
-  [[nodiscard]] bool covers(TimeNs t_ns) const;   ///< are there inertial samples (nearly) up to the frame's time?
-  [[nodiscard]] bool is_next(TimeNs t_ns) const;  ///< is a frame with this stamp later than the one before?
+  [[nodiscard]] InputCounts input_counts() const;  ///< of samples; frames are the caller's
+  [[nodiscard]] bool covers(TimeNs t_ns) const;    ///< are there inertial samples (nearly) up to the frame's time?
+  [[nodiscard]] bool is_next(TimeNs t_ns) const;   ///< is a frame with this stamp later than the one before?
   [[nodiscard]] TimeNs camera_time(TimeNs imu_time_ns) const;  ///< the stamp that the camera has at that time
   [[nodiscard]] const State& state() const { return state_; }
   [[nodiscard]] const Covariance& covariance() const { return covariance_; }
@@ -113,9 +117,18 @@ class Filter {
     double unseen = 0.0;  ///< [s] that passed
   };
 
+  struct Clocks {
+    ImuClock imu;
+    StreamClock encoder, camera;
+  };
+
   static constexpr TimeNs kDisagrees = -1;
 
   // filter.cpp
+  void hear(ImuClock::Stream stream, TimeNs t_ns);
+  void take_waiting_imu();
+  [[nodiscard]] std::optional<TimeNs> now() const;
+  void take_imu(const ImuSample& sample);
   [[nodiscard]] TimeNs imu_time(TimeNs camera_time_ns) const;
   [[nodiscard]] std::optional<TimeNs> state_time() const;
   bool begin_frame(const FeatureFrame& frame, bool frozen);
@@ -200,6 +213,7 @@ class Filter {
   Status status_ = Status::waiting_for_imu;
   State state_;
   Covariance covariance_;
+  Clocks clocks_;
   ImuBuffer imu_;
   InputGuard guard_;
   ImpactGuard impact_guard_;

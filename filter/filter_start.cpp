@@ -26,6 +26,7 @@ constexpr double kUnseenSpeed = 1.0;         // [m/s] that the vehicle may have 
 /// As after construction, but for the inertial clock, and where the vehicle was last known to be.
 void Filter::restart(TimeNs t_ns, TimeNs clock_shift) {
   Filter fresh(config_, calibration_);
+  fresh.clocks_ = std::move(clocks_);
   fresh.guard_ = std::move(guard_);
   fresh.guard_.restart();
   fresh.monitor_.succeed(monitor_, t_ns);

@@ -129,6 +129,11 @@ void HealthMonitor::accuse_imu(bool gyro, bool accel, TimeNs t_ns) {
   if (accel) accuse({Source::accelerometer}, t_ns);
 }
 
+void HealthMonitor::accuse_cameras(TimeNs t_ns) {
+  for (std::size_t camera = 0; camera < cameras_; ++camera) trust_[camera].accuse(t_ns);
+  decide(t_ns);
+}
+
 void HealthMonitor::add_encoder(const EncoderSample& sample, Verdict verdict, TimeNs imu_ns) {
   last_encoder_ns_ = imu_ns;
   if (verdict == Verdict::impossible || encoder_stamps_.add(sample.t_ns, imu_ns))
@@ -156,16 +161,14 @@ void HealthMonitor::add_refused_frame(TimeNs imu_ns) {
   if (!imu_goes_on) {
     accuse({Source::gyroscope, Source::accelerometer}, imu_ns);
   } else {
-    for (std::size_t camera = 0; camera < cameras_; ++camera) trust_[camera].accuse(imu_ns);
+    accuse_cameras(imu_ns);
   }
   decide(imu_ns);
 }
 
 /// Sensors that say nothing are as little to be trusted as those that lie.
 void HealthMonitor::note_silence(TimeNs t_ns) {
-  if (!last_frame_ns_) return;
-  const double since = seconds_between(*last_frame_ns_, t_ns);
-  if (since < std::max(kSilent, kMissedFrames * frame_interval_)) return;
+  if (!last_frame_ns_ || images_come(t_ns)) return;
   for (std::size_t camera = 0; camera < cameras_; ++camera) trust_[camera].add(true, t_ns);
   for (const Source source : {Source::gyroscope, Source::accelerometer}) trust(source).add(false, t_ns);
   decide(t_ns);
@@ -181,7 +184,10 @@ void HealthMonitor::add_frame(const Frame& frame, const std::array<SourceRecord,
       frame_interval_ += (frame_interval_ == 0.0 ? 1.0 : 0.1) * (interval - frame_interval_);
     }
     last_frame_ns_ = t_ns;
+    last_arrival_ns_ = last_imu_ ? std::max(t_ns, last_imu_->t_ns) : t_ns;
     judge_cameras(frame);
+    late_ = camera_stamps_unusual_ && !camera_stamps_wrong_ && frame.agreement.matches > 0 &&
+            frame.agreement.left < kManyOff;
     if (camera_stamps_unusual_) {
       for (std::size_t camera = 0; camera < cameras_; ++camera) trust_[camera].accuse(t_ns);
     }
@@ -267,6 +273,12 @@ void HealthMonitor::judge_turn(const Frame& frame) {
   turns_otherwise_ = known && turn_rate_.norm() > std::max(kTurnOff, by_chance) + feigned_turn_;
 }
 
+/// Did one come in not long ago?
+bool HealthMonitor::images_come(TimeNs t_ns) const {
+  return cameras_ > 0 && last_frame_ns_ &&
+         seconds_between(last_arrival_ns_, t_ns) < std::max(kSilent, kMissedFrames * frame_interval_);
+}
+
 bool HealthMonitor::velocity_known() const {
   return last_.velocity_sigma < std::max(kWorstVelocity, kWorstDirection * last_.speed);
 }
@@ -277,9 +289,7 @@ void HealthMonitor::decide(TimeNs t_ns) {
     aided_ns_ = fitting_ns_ = t_ns;
   }
   const FrameStatistics frame = seconds_between(last_.t_ns, t_ns) < kStale ? last_.statistics : FrameStatistics{};
-  const bool images_come = last_frame_ns_ && (cameras_ > 0) &&
-                           seconds_between(*last_frame_ns_, t_ns) < std::max(kSilent, kMissedFrames * frame_interval_);
-  const bool cameras = images_come && frame.tracks >= kFewTracks && trusted(Source::camera_left);
+  const bool cameras = images_come(t_ns) && frame.tracks >= kFewTracks && (trusted(Source::camera_left) || late_);
   const bool wheels = wheels_ && frame.on_ground && (trusted(Source::wheel_left) || trusted(Source::wheel_right)) &&
                       frame.wheel_rows_used > 0;
   health_.aiding = frame.standing      ? Aiding::standing
@@ -288,7 +298,7 @@ void HealthMonitor::decide(TimeNs t_ns) {
                    : wheels            ? Aiding::wheels
                                        : Aiding::none;
   if (health_.aiding != Aiding::none) aided_ns_ = t_ns;
-  const bool off = images_come && frame.tracks >= kFewTracks && last_.agreement.left > kMostOff;
+  const bool off = images_come(t_ns) && frame.tracks >= kFewTracks && last_.agreement.left > kMostOff;
   if (!off || wheels) fitting_ns_ = t_ns;
   contradicted_ = last_.running && seconds_between(fitting_ns_, t_ns) > kContradicted;
 

@@ -64,6 +64,7 @@ class HealthMonitor {
   void add_refused_imu();
   /// What only a fault of the sensor does: a spike, a bias that jumps.
   void accuse_imu(bool gyro, bool accel, TimeNs t_ns);
+  void accuse_cameras(TimeNs t_ns);
   /// A reading, used or refused, and the stamp of the newest inertial sample.
   void add_encoder(const EncoderSample& sample, Verdict verdict, TimeNs imu_ns);
   void add_laser(const LaserSample& sample, Verdict verdict, const LaserCalibration& lasers, TimeNs imu_ns);
@@ -105,6 +106,7 @@ class HealthMonitor {
   void decide(TimeNs t_ns);
   [[nodiscard]] Trust& trust(Source source) { return trust_[index_of(source)]; }
   [[nodiscard]] bool trusted(Source source) const { return trust_[index_of(source)].trusted(); }
+  [[nodiscard]] bool images_come(TimeNs t_ns) const;
   [[nodiscard]] bool velocity_known() const;
   [[nodiscard]] int quality(const Frame& frame) const;
   void accuse(std::initializer_list<Source> sources, TimeNs t_ns);
@@ -118,6 +120,7 @@ class HealthMonitor {
 
   std::optional<ImuSample> last_imu_;
   std::optional<TimeNs> last_frame_ns_;
+  TimeNs last_arrival_ns_ = 0;  ///< the newest inertial stamp when that came
   std::optional<TimeNs> last_refused_imu_ns_;
   double frame_interval_ = 0.0;  ///< [s] usual
   TimeNs last_tick_ns_ = 0;
@@ -127,6 +130,7 @@ class HealthMonitor {
   StampWatch camera_stamps_, encoder_stamps_, laser_stamps_;
   bool camera_stamps_unusual_ = false;
   bool camera_stamps_wrong_ = false;
+  bool late_ = false;                                    ///< the last image came late, and fits
   Eigen::Vector3d turn_rate_ = Eigen::Vector3d::Zero();  ///< of the cameras less that of the gyroscope [rad/s], recent
   double turn_scatter_ = 1e-4;                           ///< [rad^2/s^2] of the single ones
   double feigned_turn_ = 0.0;                            ///< [rad/s] recent

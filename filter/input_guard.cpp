@@ -103,6 +103,11 @@ Verdict InputGuard::judge(const EncoderSample& sample, std::optional<TimeNs> sta
   return Verdict::accepted;
 }
 
+Verdict InputGuard::refuse_encoder() {
+  ++counts_.encoder.far_ahead;
+  return Verdict::impossible;
+}
+
 Verdict InputGuard::judge(const LaserSample& sample, std::optional<TimeNs> state_ns) {
   StreamCounts& counts = counts_.laser;
   const auto any = [&sample](const auto& condition) {

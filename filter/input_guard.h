@@ -42,6 +42,11 @@ class InputGuard {
   /// The frame without the features that cannot be; the frame itself if there are none. Valid until the next call.
   [[nodiscard]] const FeatureFrame& sound(const FeatureFrame& frame);
 
+  /// A reading whose stamp leapt, before it is known why.
+  Verdict refuse_encoder();
+  /// Are the inertial samples refused, for stamps that are not later?
+  [[nodiscard]] bool refuses_imu() const { return refused_from_ns_.has_value(); }
+
   /// The filter begins anew: forgets the readings, but not the inertial clock nor the counts.
   void restart();
 

@@ -167,6 +167,24 @@ void write_estimate(const ear::Estimate& from, ear_estimate& to) {
   to.on_ground = from.frame.on_ground ? 1 : 0;
 }
 
+static_assert(EAR_SOURCE_COUNT == ear::kSourceCount);
+static_assert(EAR_SOURCE_ACCELEROMETER == static_cast<int>(ear::Source::accelerometer));
+static_assert(EAR_AIDING_CAMERAS_AND_WHEELS == static_cast<int>(ear::Aiding::cameras_and_wheels));
+static_assert(EAR_HEALTH_LOST == static_cast<int>(ear::HealthStatus::lost));
+
+void write_health(const ear::Health& from, ear_health& to) {
+  to = {};
+  to.status = static_cast<ear_health_status>(from.status);
+  to.since_ns = from.since_ns;
+  to.untrusted = static_cast<std::uint32_t>(from.untrusted.to_ulong());
+  std::copy(from.onset_ns.begin(), from.onset_ns.end(), to.onset_ns);
+  to.aiding = static_cast<ear_aiding>(from.aiding);
+  to.quality = from.quality;
+  to.horizontal_sigma = from.horizontal_sigma;
+  to.vertical_sigma = from.vertical_sigma;
+  to.reset_counter = from.reset_counter;
+}
+
 ear_result result_of(bool queued) { return queued ? EAR_OK : EAR_QUEUE_FULL; }
 
 ear::ImageView view_of(const std::uint8_t* data, const ear::CameraCalibration& camera, std::ptrdiff_t stride) {
@@ -335,6 +353,19 @@ ear_status ear_status_of(const ear_odometry* odometry) {
   return EAR_WAITING_FOR_IMU;
 }
 
+ear_result ear_health_of(const ear_odometry* odometry, ear_health* health) {
+  return guarded([&] {
+    if (odometry == nullptr || health == nullptr) return EAR_INVALID_ARGUMENT;
+    write_health(odometry->queued.odometry().health(), *health);
+    return EAR_OK;
+  });
+}
+
+const char* ear_source_text(ear_source source) {
+  const auto i = static_cast<std::size_t>(source);
+  return i < ear::kSourceCount ? ear::kSourceNames[i] : "unknown source";
+}
+
 ear_result ear_counts_of(const ear_odometry* odometry, ear_counts* counts) {
   return guarded([&] {
     if (odometry == nullptr || counts == nullptr) return EAR_INVALID_ARGUMENT;
@@ -350,6 +381,7 @@ ear_result ear_counts_of(const ear_odometry* odometry, ear_counts* counts) {
     counts->laser_rejected = inputs.laser.rejected();
     counts->imu_spikes = inputs.imu_spikes;
     counts->imu_gaps = inputs.imu.gaps;
+    counts->clock_leaps = inputs.clock_leaps;
     counts->frames_rejected = inputs.camera.rejected() - inputs.camera.far_ahead;
     counts->frames_without_imu = inputs.camera.far_ahead;
     return EAR_OK;

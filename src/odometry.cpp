@@ -36,8 +36,15 @@ class Odometry::Impl {
   void add_encoder(const EncoderSample& sample) { filter_.add_encoder(sample); }
   void add_laser(const LaserSample& sample) { filter_.add_laser(sample); }
 
-  std::optional<Estimate> add_stereo(const StereoFrame& frame) {
+  std::optional<Estimate> add_stereo(const StereoFrame& given) {
     stage_times_ = StageTimes{};
+    const std::optional<TimeNs> stamp_ns = filter_.common_stamp(given.t_ns);
+    if (!stamp_ns) {
+      ++camera_.far_ahead;
+      return std::nullopt;
+    }
+    StereoFrame frame = given;
+    frame.t_ns = *stamp_ns;
     if (!accepts(frame.t_ns, camera_)) {
       if (is_time(frame.t_ns) && filter_.is_next(frame.t_ns)) filter_.refuse_frame();
       return std::nullopt;

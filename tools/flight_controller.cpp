@@ -46,7 +46,7 @@ FlightController::FlightController(const FlightControllerArguments& args, const 
     : clock_(first_ns),
       stream_(mounting(args, calibration), calibration.imu),
       link_(args.address, {static_cast<std::uint8_t>(args.system)}, [this] { return clock_.now(); }) {
-  link_.send(mavlink::to_text(announced_));
+  announce(mavlink::LinkHealth::starting, {});
 }
 
 void FlightController::before_sample(const Sample& sample, const Odometry& odometry) {
@@ -62,7 +62,7 @@ void FlightController::before_sample(const Sample& sample, const Odometry& odome
 
 void FlightController::after_frame(const ReplayedFrame& frame, const Odometry& odometry) {
   const auto message = stream_.add_frame(frame.estimate, odometry.status());
-  announce(stream_.health());
+  announce(stream_.health(), odometry.health().untrusted);
   if (message) link_.send(*message);
 }
 
@@ -78,11 +78,12 @@ std::string FlightController::report() const {
   return line.data();
 }
 
-void FlightController::announce(mavlink::LinkHealth health) {
-  if (health == announced_) return;
-  announced_ = health;
+void FlightController::announce(mavlink::LinkHealth health, const SourceSet& untrusted) {
+  const mavlink::StatusText text = mavlink::to_text(health, untrusted);
+  if (text.text == announced_) return;
+  announced_ = text.text;
   link_.set_state(mavlink::to_system_state(health));
-  link_.send(mavlink::to_text(health));
+  link_.send(text);
 }
 
 }  // namespace ear::tools

@@ -42,13 +42,13 @@ class FlightController {
   [[nodiscard]] std::string report() const;
 
  private:
-  void announce(mavlink::LinkHealth health);
+  void announce(mavlink::LinkHealth health, const SourceSet& untrusted);
 
   RealTimeClock clock_;
   mavlink::OdometryStream stream_;
   std::optional<TimeNs> last_imu_ns_;
-  mavlink::LinkHealth announced_ = mavlink::LinkHealth::starting;
-  mavlink::Link link_;  ///< last: its thread reads the clock
+  std::string announced_;  ///< the last text
+  mavlink::Link link_;     ///< last: its thread reads the clock
 };
 
 }  // namespace ear::tools

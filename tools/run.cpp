@@ -137,6 +137,7 @@ RunSummary summarize(const RunArguments& args, const Recording& recording, const
                     {"beams_used", totals.beams_used},
                     {"beams_rejected", totals.beams_rejected},
                     {"imu_spikes", inputs.imu_spikes},
+                    {"clock_leaps", inputs.clock_leaps},
                     {"wild_features", inputs.features_rejected},
                     {"steps_rejected", inputs.steps_rejected},
                     {"resets", odometry.health().reset_counter}};

@@ -195,11 +195,61 @@ ear_result ear_predict(const ear_odometry* odometry, int64_t t_ns, ear_state* st
 
 ear_status ear_status_of(const ear_odometry* odometry);
 
+/* -- what the estimator says of itself and of its sensors; meanings, thresholds and times: docs/health.md -- */
+
+typedef enum {
+  EAR_HEALTH_INITIALISING = 0, /* there was no estimate yet */
+  EAR_HEALTH_TRACKING = 1,     /* each sensor is trusted, or is rightly silent */
+  EAR_HEALTH_DEGRADED = 2,     /* the estimate may be used, but rests on fewer sensors than it should */
+  EAR_HEALTH_LOST = 3          /* it may be anywhere, and none is given */
+} ear_health_status;
+
+/* Each is bit 1 << EAR_SOURCE_... of ear_health.untrusted, and has its place in the array. */
+typedef enum {
+  EAR_SOURCE_CAMERA_LEFT = 0,
+  EAR_SOURCE_CAMERA_RIGHT = 1,
+  EAR_SOURCE_WHEEL_LEFT = 2,
+  EAR_SOURCE_WHEEL_RIGHT = 3,
+  EAR_SOURCE_BEAM_0 = 4, /* lasers in the order of the calibration */
+  EAR_SOURCE_BEAM_1 = 5,
+  EAR_SOURCE_BEAM_2 = 6,
+  EAR_SOURCE_GYROSCOPE = 7,
+  EAR_SOURCE_ACCELEROMETER = 8,
+  EAR_SOURCE_COUNT = 9
+} ear_source;
+
+/* What carries the estimate, besides the inertial sensors. */
+typedef enum {
+  EAR_AIDING_NONE = 0,
+  EAR_AIDING_STANDING = 1,
+  EAR_AIDING_WHEELS = 2,
+  EAR_AIDING_CAMERAS = 3,
+  EAR_AIDING_CAMERAS_AND_WHEELS = 4
+} ear_aiding;
+
+typedef struct {
+  ear_health_status status;
+  int64_t since_ns;                   /* when the status began, IMU time */
+  uint32_t untrusted;                 /* sources that the estimate should rest on, and does not */
+  int64_t onset_ns[EAR_SOURCE_COUNT]; /* of these: since when */
+  ear_aiding aiding;                  /* what is left */
+  int32_t quality;                    /* 0 (lost) ... 100 */
+  double horizontal_sigma;            /* [m] standard deviation of the position since the start, worst direction */
+  double vertical_sigma;              /* [m] */
+  uint8_t reset_counter;              /* grows when the pose goes on with a jump: after lost */
+} ear_health;
+
+/* At any time, also without an estimate. The consumer's thread. */
+ear_result ear_health_of(const ear_odometry* odometry, ear_health* health);
+
+/* The name of a source, such as "wheel_left"; "unknown source" for what is none. */
+const char* ear_source_text(ear_source source);
+
 /* What was refused since the start; nothing is lost silently. */
 typedef struct {
   uint64_t imu_overflow, encoder_overflow, laser_overflow, frame_overflow; /* the queue was full */
   uint64_t imu_rejected, encoder_rejected, laser_rejected;                 /* not finite, out of order, too late */
-  uint64_t imu_spikes, imu_gaps;
+  uint64_t imu_spikes, imu_gaps, clock_leaps;
   uint64_t frames_rejected, frames_without_imu;
 } ear_counts;
 

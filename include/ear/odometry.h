@@ -114,11 +114,12 @@ struct StreamCounts {
 /// What was refused or bridged since the start; nothing is lost silently. How far the samples accepted agree with the
 /// state is in Health::sources.
 struct InputCounts {
-  StreamCounts imu;              ///< gaps: longer than FilterConfig::max_imu_gap
-  StreamCounts encoder;          ///< gaps: longer than 0.25 s
-  StreamCounts laser;            ///< gaps: longer than 0.25 s
-  StreamCounts camera;           ///< frames; far_ahead: no inertial samples reach their time; gaps: longer than 0.25 s
-  std::uint64_t imu_spikes = 0;  ///< single samples far from both their neighbours, whose mean was taken
+  StreamCounts imu;               ///< gaps: longer than FilterConfig::max_imu_gap
+  StreamCounts encoder;           ///< gaps: longer than 0.25 s
+  StreamCounts laser;             ///< gaps: longer than 0.25 s
+  StreamCounts camera;            ///< frames; far_ahead: no inertial samples reach their time; gaps: longer than 0.25 s
+  std::uint64_t imu_spikes = 0;   ///< single samples far from both their neighbours, whose mean was taken
+  std::uint64_t clock_leaps = 0;  ///< of one sensor's clock against all others, which were taken out
   std::uint64_t features_rejected = 0;  ///< not finite, outside any image, or twice in a frame
   std::uint64_t steps_rejected = 0;     ///< calls of Odometry::step for a time not later than the state, or without IMU
 };

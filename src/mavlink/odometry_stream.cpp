@@ -1,8 +1,10 @@
 #include "src/mavlink/odometry_stream.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <iterator>
+#include <string>
 
 namespace ear::mavlink {
 namespace {
@@ -12,8 +14,6 @@ constexpr double kMinInterval = 0.9 / 50.0;  // [s] 50 Hz, and a tenth for jitte
 constexpr double kMaxUnsupported =
     0.25;                            // [s] after a frame; with no frame since, the estimate is not vision's any more
 constexpr double kMaxLatency = 0.5;  // [s] from an exposure to its estimate
-constexpr int kQualityPerFeature = 2;
-constexpr int kWheelQuality = 40;
 constexpr int kWeakQuality = 20;
 constexpr int kGoodQuality = 30;  // hysteresis: a weak estimate is good again from here on
 
@@ -22,16 +22,39 @@ int messages_per_frame(double frame_interval) {
   return std::max(1, static_cast<int>(std::ceil(kMinRate * frame_interval - 0.1)));
 }
 
+struct Part {
+  const char* name;
+  Source first, last;
+};
+constexpr std::array<Part, 5> kParts{{{"cameras", Source::camera_left, Source::camera_right},
+                                      {"wheels", Source::wheel_left, Source::wheel_right},
+                                      {"beams", Source::beam_0, Source::beam_2},
+                                      {"gyro", Source::gyroscope, Source::gyroscope},
+                                      {"accel", Source::accelerometer, Source::accelerometer}}};
+
+std::string without(const SourceSet& untrusted) {
+  std::string text = "ear: without";
+  const char* separator = " ";
+  for (const Part& part : kParts) {
+    bool any = false;
+    for (std::size_t i = index_of(part.first); i <= index_of(part.last); ++i) any = any || untrusted[i];
+    if (!any) continue;
+    text += separator + std::string(part.name);
+    separator = ", ";
+  }
+  return text;
+}
+
 }  // namespace
 
-StatusText to_text(LinkHealth health) {
+StatusText to_text(LinkHealth health, const SourceSet& untrusted) {
   switch (health) {
     case LinkHealth::starting:
       return {Severity::notice, "ear: not started"};
     case LinkHealth::good:
       return {Severity::notice, "ear: tracking"};
     case LinkHealth::weak:
-      return {Severity::warning, "ear: tracking, but few features in view"};
+      return {Severity::warning, untrusted.any() ? without(untrusted) : "ear: tracking, but few features in view"};
     case LinkHealth::lost:
       return {Severity::critical, "ear: lost, no odometry"};
   }
@@ -51,16 +74,6 @@ SystemState to_system_state(LinkHealth health) {
   return SystemState::critical;
 }
 
-bool is_supported(const FrameStatistics& frame) {
-  return frame.tracks > 0 || frame.standing || (frame.on_ground && frame.wheel_rows_used > 0);
-}
-
-int quality_of(const FrameStatistics& frame) {
-  if (frame.standing) return 100;
-  const bool wheels = frame.on_ground && frame.wheel_rows_used > 0;
-  return std::clamp(kQualityPerFeature * frame.tracks, wheels ? kWheelQuality : 1, 100);
-}
-
 OdometryStream::OdometryStream(const Eigen::Matrix3d& R_BV, const ImuCalibration& imu)
     : R_BV_(R_BV), rate_variance_(imu.gyro_noise * imu.gyro_noise * imu.rate_hz) {}
 
@@ -70,7 +83,7 @@ void OdometryStream::add_imu(const ImuSample& sample) {
 }
 
 std::optional<OdometryMessage> OdometryStream::add_frame(const std::optional<Estimate>& estimate, Status status) {
-  if (estimate && is_supported(estimate->frame)) last_supported_ns_ = estimate->state.t_ns;
+  if (estimate && estimate->health.aiding != Aiding::none) last_supported_ns_ = estimate->state.t_ns;
   const LinkHealth before = health_;
   health_ = health_after(estimate, status);
   if (health_ == LinkHealth::lost) last_.reset();
@@ -101,15 +114,16 @@ LinkHealth OdometryStream::health_after(const std::optional<Estimate>& estimate,
     return status == Status::tracking || health_ == LinkHealth::starting ? health_ : LinkHealth::lost;
   }
   if (seconds_between(last_supported_ns_, estimate->state.t_ns) > kMaxUnsupported) return LinkHealth::lost;
-  const int quality = quality_of(estimate->frame);
-  return quality < (health_ == LinkHealth::weak ? kGoodQuality : kWeakQuality) ? LinkHealth::weak : LinkHealth::good;
+  const Health& health = estimate->health;
+  const int least = health_ == LinkHealth::weak ? kGoodQuality : kWeakQuality;
+  return health.untrusted.any() || health.quality < least ? LinkHealth::weak : LinkHealth::good;
 }
 
 OdometryMessage OdometryStream::make_message(const NavState& state) {
   OdometryMessage message = make_odometry(state, rate_B_at(state), R_BV_);
   set_covariances(message, state, last_->covariance, rate_variance_, R_BV_);
   message.reset_counter = reset_counter_;
-  message.quality = static_cast<std::int8_t>(quality_of(last_->frame));
+  message.quality = static_cast<std::int8_t>(last_->health.quality);
   last_sent_ns_ = state.t_ns;
   return message;
 }

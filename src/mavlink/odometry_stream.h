@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "ear/calibration.h"
+#include "ear/health.h"
 #include "ear/odometry.h"
 #include "src/mavlink/messages.h"
 #include "src/mavlink/odometry_message.h"
@@ -18,19 +19,13 @@ namespace ear::mavlink {
 enum class LinkHealth : std::uint8_t {
   starting,  ///< no estimate yet
   good,
-  weak,  ///< few features: the estimate drifts sooner
+  weak,  ///< a sensor is not trusted, or little is seen: the estimate drifts sooner
   lost   ///< there was an estimate, and there is none, or inertia alone carries it on
 };
 
-[[nodiscard]] StatusText to_text(LinkHealth health);
+/// `untrusted`: by whom a weak estimate does without.
+[[nodiscard]] StatusText to_text(LinkHealth health, const SourceSet& untrusted);
 [[nodiscard]] SystemState to_system_state(LinkHealth health);
-
-/// Does anything but inertia hold the estimate: features, wheels on the ground, standing?
-[[nodiscard]] bool is_supported(const FrameStatistics& frame);
-
-/// 1 ... 100: two for each feature that the cameras track, at least 40 where wheels carry on; 100 for a vehicle that is
-/// known to stand.
-[[nodiscard]] int quality_of(const FrameStatistics& frame);
 
 class OdometryStream {
  public:

@@ -1,5 +1,6 @@
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -18,7 +19,9 @@ Estimate estimate_at(double seconds, int tracks = 100) {
   Estimate estimate;
   estimate.state.t_ns = at(seconds);
   estimate.covariance.setIdentity();
-  estimate.frame.tracks = tracks;
+  estimate.health.status = HealthStatus::tracking;
+  estimate.health.aiding = tracks >= 10 ? Aiding::cameras : Aiding::none;
+  estimate.health.quality = std::min(100, std::max(1, 2 * tracks));
   return estimate;
 }
 
@@ -132,8 +135,7 @@ TEST_CASE("mavlink stream: what inertia alone carries on is lost after a quarter
     CHECK(stream.add_frame(estimate_at(0.0), Status::tracking));
     for (int i = 1; i <= 20; ++i) {
       Estimate blind = estimate_at(0.05 * i, 0);
-      blind.frame.on_ground = wheels;
-      blind.frame.wheel_rows_used = wheels ? 10 : 0;
+      if (wheels) blind.health.aiding = Aiding::wheels;
       const bool expected = wheels || i <= 5;
       CHECK(stream.add_frame(blind, Status::tracking).has_value() == expected);
       CHECK((stream.health() == LinkHealth::lost) == !expected);
@@ -145,32 +147,24 @@ TEST_CASE("mavlink stream: what inertia alone carries on is lost after a quarter
   }
 }
 
-TEST_CASE("mavlink stream: quality and health follow the number of features, with hysteresis") {
+TEST_CASE("mavlink stream: the quality is the estimator's; weak is low quality, with hysteresis, or a missing sensor") {
   OdometryStream stream = make_stream();
-  const auto after = [&](double t, int tracks) {
-    const auto message = stream.add_frame(estimate_at(t, tracks), Status::tracking);
+  const auto after = [&](double t, int quality, bool untrusted = false) {
+    Estimate estimate = estimate_at(t);
+    estimate.health.quality = quality;
+    estimate.health.untrusted[index_of(Source::wheel_left)] = untrusted;
+    const auto message = stream.add_frame(estimate, Status::tracking);
     REQUIRE(message);
-    return message->quality;
+    CHECK(message->quality == quality);
+    return stream.health();
   };
-  CHECK(after(0.0, 150) == 100);
-  CHECK(after(0.1, 12) == 24);
-  CHECK(stream.health() == LinkHealth::good);
-  CHECK(after(0.2, 4) == 8);
-  CHECK(stream.health() == LinkHealth::weak);
-  CHECK(after(0.3, 12) == 24);
-  CHECK(stream.health() == LinkHealth::weak);
-  CHECK(after(0.4, 0) == 1);
-  CHECK(after(0.5, 20) == 40);
-  CHECK(stream.health() == LinkHealth::good);
-
-  Estimate on_wheels = estimate_at(0.55, 3);
-  on_wheels.frame.on_ground = true;
-  on_wheels.frame.wheel_rows_used = 15;
-  CHECK(stream.add_frame(on_wheels, Status::tracking)->quality == 40);
-
-  Estimate standing = estimate_at(0.6, 0);
-  standing.frame.standing = true;  // in the dark, on its wheels
-  CHECK(stream.add_frame(standing, Status::tracking)->quality == 100);
+  CHECK(after(0.0, 100) == LinkHealth::good);
+  CHECK(after(0.1, 24) == LinkHealth::good);
+  CHECK(after(0.2, 8) == LinkHealth::weak);
+  CHECK(after(0.3, 24) == LinkHealth::weak);
+  CHECK(after(0.4, 40) == LinkHealth::good);
+  CHECK(after(0.5, 60, true) == LinkHealth::weak);
+  CHECK(after(0.6, 60) == LinkHealth::good);
 }
 
 TEST_CASE("mavlink stream: the variance of the angular rate is the noise of one sample and the bias") {
@@ -183,9 +177,15 @@ TEST_CASE("mavlink stream: the variance of the angular rate is the noise of one 
   CHECK(message->velocity_covariance(5, 5) == doctest::Approx(1.0 + 4e-6 * 400.0));
 }
 
-TEST_CASE("mavlink stream: every state of health has a text that fits") {
+TEST_CASE("mavlink stream: every state of health has a text that fits, and names who is not trusted") {
   for (const LinkHealth health : {LinkHealth::starting, LinkHealth::good, LinkHealth::weak, LinkHealth::lost}) {
-    CHECK_FALSE(to_text(health).text.empty());
-    CHECK(to_text(health).text.size() <= StatusText::kMaxLength);
+    for (unsigned long sources = 0; sources < 1UL << kSourceCount; ++sources) {
+      CHECK_FALSE(to_text(health, sources).text.empty());
+      CHECK(to_text(health, sources).text.size() <= StatusText::kMaxLength);
+    }
   }
+  SourceSet untrusted;
+  untrusted.set(index_of(Source::camera_right));
+  untrusted.set(index_of(Source::gyroscope));
+  CHECK(to_text(LinkHealth::weak, untrusted).text == "ear: without cameras, gyro");
 }

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstring>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <opencv2/core.hpp>
 #include <string>
@@ -232,6 +233,43 @@ TEST_CASE("C interface: estimates are those of class Odometry, bit for bit") {
   ear_state state{};
   REQUIRE(ear_predict(odometry.get(), later, &state) == EAR_OK);
   CHECK((Eigen::Vector3d::Map(state.p_WB) - position(estimates.back())).norm() < 1e-9);
+
+  ear_health health{};
+  REQUIRE(ear_health_of(odometry.get(), &health) == EAR_OK);
+  CHECK(health.status == EAR_HEALTH_TRACKING);
+  CHECK(health.aiding == EAR_AIDING_CAMERAS_AND_WHEELS);
+  CHECK(health.untrusted == 0);
+  CHECK(health.quality == expected.back().health.quality);
+  CHECK(health.horizontal_sigma == expected.back().health.horizontal_sigma);
+  CHECK(health.vertical_sigma == expected.back().health.vertical_sigma);
+}
+
+TEST_CASE("C interface: before the start the health says so, and after a gap which sensor it does without") {
+  const Handle odometry = make();
+  ear_health health{};
+  REQUIRE(ear_health_of(odometry.get(), &health) == EAR_OK);
+  CHECK(health.status == EAR_HEALTH_INITIALISING);
+  CHECK(health.quality == 0);
+  run(odometry.get(), 1);
+  ear_imu_sample sample = drive().imu(drive().simulation.imu().size() - 1);
+  for (int i = 0; i < 40; ++i) {  // no images come, the inertial samples go on
+    sample.t_ns += 5'000'000;
+    REQUIRE(ear_add_imu(odometry.get(), &sample) == EAR_OK);
+  }
+  sample.t_ns += 5'000'000;
+  sample.gyro_B[0] = std::numeric_limits<double>::quiet_NaN();
+  REQUIRE(ear_add_imu(odometry.get(), &sample) == EAR_OK);
+  sample.t_ns += 5'000'000;
+  sample.gyro_B[0] = 0.0;
+  REQUIRE(ear_add_imu(odometry.get(), &sample) == EAR_OK);
+  ear_estimate estimate{};
+  static_cast<void>(ear_step(odometry.get(), sample.t_ns, &estimate));
+  REQUIRE(ear_health_of(odometry.get(), &health) == EAR_OK);
+  CHECK(health.status == EAR_HEALTH_DEGRADED);
+  CHECK((health.untrusted >> EAR_SOURCE_GYROSCOPE & 1U) == 1);
+  CHECK(health.onset_ns[EAR_SOURCE_GYROSCOPE] > 0);
+  CHECK(std::string(ear_source_text(EAR_SOURCE_GYROSCOPE)) == "gyroscope");
+  CHECK(std::string(ear_source_text(EAR_SOURCE_COUNT)) == "unknown source");
 }
 
 TEST_CASE("C interface: a consumer that is behind, and one after a reset, miss nothing") {
@@ -404,6 +442,7 @@ TEST_CASE("C interface: null is refused everywhere") {
   CHECK(ear_process(odometry, nullptr) == EAR_INVALID_ARGUMENT);
   CHECK(ear_step(odometry, 0, nullptr) == EAR_INVALID_ARGUMENT);
   CHECK(ear_predict(odometry, 0, nullptr) == EAR_INVALID_ARGUMENT);
+  CHECK(ear_health_of(odometry, nullptr) == EAR_INVALID_ARGUMENT);
   CHECK(ear_counts_of(odometry, nullptr) == EAR_INVALID_ARGUMENT);
   ear_imu_sample imu{};
   ear_estimate estimate{};

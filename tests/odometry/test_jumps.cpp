@@ -46,8 +46,9 @@ Outcome run(const std::string& sequence, const std::string& fault) {
 
 TEST_CASE("jumps: on the ground they cost little, are announced, and nothing is lost") {
   const double clean = run("flat1", "").ate;
-  for (const std::string fault : {"imu_bias_jump", "imu_bias_jump.gyro", "imu_bias_jump.accel", "camera_frozen",
-                                  "camera_swapped", "clock_jump.camera", "camera_late", "imu_spikes"}) {
+  for (const std::string fault :
+       {"imu_bias_jump", "imu_bias_jump.gyro", "imu_bias_jump.accel", "camera_frozen", "camera_swapped",
+        "clock_jump.camera", "clock_jump.imu", "clock_jump.encoder", "camera_late", "imu_spikes"}) {
     CAPTURE(fault);
     const Outcome outcome = run("flat1", fault);
     CHECK(outcome.ate < 2.0 * clean);
@@ -64,5 +65,16 @@ TEST_CASE("jumps: in flight an image that stays is as good as none") {
     CHECK(outcome.ate < 0.15);  // 5 s of inertia; standing still by a frozen image would be more than a metre
     CHECK(outcome.named);
     CHECK(outcome.lost > 1.0);  // it says that it knows no more
+  }
+}
+
+TEST_CASE("jumps: in flight a clock that leaps, and images that come late, cost little and are announced") {
+  const double clean = run("fly1", "").ate;
+  for (const std::string fault : {"clock_jump.camera", "clock_jump.imu", "camera_late"}) {
+    CAPTURE(fault);
+    const Outcome outcome = run("fly1", fault);
+    CHECK(outcome.ate < 1.5 * clean);
+    CHECK(outcome.named);
+    CHECK(outcome.lost == 0.0);
   }
 }

@@ -17,9 +17,12 @@ void replay(const simulator::Simulation& simulation, Filter& filter, const OnEst
     hand_over(simulation, delivery, filter);
     if (delivery.stream == simulator::SensorStream::camera && options.camera) {
       FeatureFrame frame = simulation.tracks(delivery.index);
-      if (options.change) options.change(frame);
-      if (filter.is_next(frame.t_ns) && filter.covers(frame.t_ns)) steps.saw_frame(delivery.arrival_ns);
-      estimate(frame.t_ns, filter.process(frame));
+      if (const std::optional<TimeNs> stamp_ns = filter.common_stamp(frame.t_ns)) {
+        frame.t_ns = *stamp_ns;
+        if (options.change) options.change(frame);
+        if (filter.is_next(frame.t_ns) && filter.covers(frame.t_ns)) steps.saw_frame(delivery.arrival_ns);
+        estimate(frame.t_ns, filter.process(frame));
+      }
     } else if (delivery.stream == simulator::SensorStream::imu && steps.due(delivery.arrival_ns)) {
       const TimeNs stamp_ns = filter.camera_time(simulation.imu()[delivery.index].t_ns);
       estimate(stamp_ns, filter.process_without_image(stamp_ns));

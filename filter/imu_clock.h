@@ -1,0 +1,60 @@
+// Whose clock is it that jumps? Where the stamps of the inertial samples leap and those of the other sensors, as they
+// come in, do not, it is the inertial clock's fault: its stamps are moved back onto the common clock. Where the others
+// leap as well, or went on meanwhile, samples are missing, or time is another for all. docs/filter.md, section 14.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+
+#include "ear/types.h"
+#include "filter/ring.h"
+
+namespace ear {
+
+class ImuClock {
+ public:
+  enum class Stream : std::uint8_t { encoder, laser, camera };
+
+  ImuClock();
+
+  /// A sample as its driver stamped it, in the order of arrival. After a leap samples wait until the other sensors have
+  /// told whose it is, for a quarter of a second at most.
+  void add(const ImuSample& sample);
+  /// Another sensor's reading came in.
+  void hear(Stream stream, TimeNs stamp_ns);
+
+  /// The next sample that does not wait, by the common clock. To be asked until there is none, after add() and hear().
+  [[nodiscard]] std::optional<ImuSample> next();
+
+  [[nodiscard]] bool waiting() const { return waiting_; }
+  [[nodiscard]] int leaps_mended() const { return mended_; }
+
+ private:
+  /// What is known of another stream; stamps [ns], by its own clock.
+  struct Other {
+    std::optional<TimeNs> newest_ns;
+    std::optional<TimeNs> before_ns;  ///< the newest when the last inertial sample came that followed the one before
+    double ahead = 0.0;               ///< [s] of the inertial samples, usually
+  };
+
+  [[nodiscard]] bool leaps(double step) const;
+  [[nodiscard]] bool others_tell(double step) const;
+  void follow(TimeNs driver_ns);
+  void settle(bool own_clock);
+  void review(Other& other, TimeNs stamp_ns);
+
+  std::array<Other, 3> others_;
+  Ring<ImuSample> samples_;          ///< not fetched yet, by the driver's clock
+  bool waiting_ = false;             ///< for a verdict
+  double leap_ = 0.0;                ///< [s] what it is about
+  int votes_ = 0;                    ///< readings for a leap of the inertial clock, less those against
+  TimeNs shift_ns_ = 0;              ///< driver's clock less the common one
+  std::optional<TimeNs> last_ns_;    ///< the newest sample that followed the one before, by the driver's clock
+  double interval_ = 0.0;            ///< [s] usual
+  std::optional<TimeNs> mended_ns_;  ///< when a leap was last taken out; until that is past doubt
+  int contradictions_ = 0;           ///< readings in a row against it
+  int mended_ = 0;
+};
+
+}  // namespace ear

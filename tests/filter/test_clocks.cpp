@@ -1,0 +1,197 @@
+// The clocks of the sensors: a leap of one of them is taken out, all else is left alone.
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <vector>
+
+#include "filter/imu_clock.h"
+#include "filter/stream_clock.h"
+
+using namespace ear;
+
+namespace {
+
+constexpr TimeNs kMs = 1'000'000;
+constexpr TimeNs kLeapAt = 2'000 * kMs;
+constexpr TimeNs kBackAt = 4'000 * kMs;
+constexpr TimeNs kEnd = 6'000 * kMs;
+
+/// What a driver makes of a reading at this true time: its stamp; a negative one if there is no reading.
+using Driver = std::function<TimeNs(TimeNs)>;
+
+TimeNs sound(TimeNs t) { return t; }
+bool amiss(TimeNs t) { return t >= kLeapAt && t < kBackAt; }
+
+/// A stamp at which an inertial sample comes out, and the true time.
+struct Out {
+  TimeNs t = 0, stamp = 0;
+};
+
+/// Inertial samples each 5 ms, wheels each 10 ms a moment later, frames each 33 ms which come 12 ms later.
+std::vector<Out> run(const Driver& imu, const Driver& wheels, const Driver& camera, bool with_wheels = true) {
+  ImuClock clock;
+  std::vector<Out> out;
+  std::vector<TimeNs> in;  // true times of samples handed in, which come out in this order
+  std::size_t fetched = 0;
+  const auto fetch = [&] {
+    while (const auto sample = clock.next()) out.push_back({in[fetched++], sample->t_ns});
+  };
+  for (TimeNs t = 0; t < kEnd; t += kMs) {
+    if (t % (5 * kMs) == 0 && imu(t) >= 0) {
+      ImuSample sample;
+      sample.t_ns = imu(t);
+      in.push_back(t);
+      clock.add(sample);
+      fetch();
+    }
+    if (with_wheels && t % (10 * kMs) == kMs && wheels(t - kMs) >= 0) {
+      clock.hear(ImuClock::Stream::encoder, wheels(t - kMs));
+      fetch();
+    }
+    const TimeNs exposed = t - 12 * kMs;
+    if (exposed >= 0 && exposed % (33 * kMs) == 0 && camera(exposed) >= 0) {
+      clock.hear(ImuClock::Stream::camera, camera(exposed));
+      fetch();
+    }
+  }
+  CHECK(fetched == in.size());
+  return out;
+}
+
+/// The largest difference between stamps and true time [s].
+double largest_error(const std::vector<Out>& out) {
+  double largest = 0.0;
+  for (const Out& o : out) largest = std::max(largest, std::abs(seconds_between(o.t, o.stamp)));
+  return largest;
+}
+
+}  // namespace
+
+TEST_CASE("imu clock: without leaps each sample comes out at once, as it is") {
+  CHECK(largest_error(run(sound, sound, sound)) == 0.0);
+  CHECK(largest_error(run(
+            sound, [](TimeNs) { return TimeNs{-1}; }, sound)) == 0.0);
+}
+
+TEST_CASE("imu clock: a leap of its own is taken out, ahead and back, also with cameras alone") {
+  for (const bool wheels : {true, false}) {
+    for (const TimeNs leap : {60 * kMs, 100 * kMs, -100 * kMs, 1500 * kMs, -1500 * kMs}) {
+      CAPTURE(leap);
+      CAPTURE(wheels);
+      const Driver leaping = [leap](TimeNs t) { return amiss(t) ? t + leap : t; };
+      if (!wheels && std::abs(leap) < 100 * kMs) continue;  // within two frames' intervals
+      CHECK(largest_error(run(leaping, sound, sound, wheels)) < 1e-3);
+    }
+  }
+}
+
+TEST_CASE("imu clock: samples that are missing, and clocks that leap together, are no leap of its own") {
+  const Driver gap = [](TimeNs t) { return t >= kLeapAt && t < kLeapAt + 300 * kMs ? TimeNs{-1} : t; };
+  CHECK(largest_error(run(gap, sound, sound)) == 0.0);
+  CHECK(largest_error(run(gap, gap, gap)) == 0.0);
+  for (const TimeNs leap : {100 * kMs, -100 * kMs}) {
+    const Driver leaping = [leap](TimeNs t) { return amiss(t) ? t + leap : t; };
+    const std::vector<Out> out = run(leaping, leaping, leaping);
+    for (const Out& o : out) CHECK(o.stamp == leaping(o.t));
+  }
+}
+
+TEST_CASE("imu clock: one false stamp is none, nor are the wheels' own leaps") {
+  const Driver once = [](TimeNs t) { return t == kLeapAt ? t - 100 * kMs : t; };
+  for (const Out& o : run(once, sound, sound)) CHECK(o.stamp == once(o.t));
+  const Driver leaping = [](TimeNs t) { return amiss(t) ? t + 100 * kMs : t; };
+  CHECK(largest_error(run(sound, leaping, sound)) == 0.0);
+}
+
+TEST_CASE("imu clock: a verdict that later readings contradict is undone") {
+  ImuClock clock;
+  TimeNs newest = 0;
+  const auto add = [&](TimeNs t) {
+    ImuSample sample;
+    sample.t_ns = t;
+    clock.add(sample);
+    while (const auto s = clock.next()) newest = s->t_ns;
+  };
+  const auto hear = [&](TimeNs t) {
+    clock.hear(ImuClock::Stream::encoder, t);
+    while (const auto s = clock.next()) newest = s->t_ns;
+  };
+  TimeNs t = 0;
+  for (; t < kLeapAt; t += 5 * kMs) {
+    add(t);
+    if (t % (10 * kMs) == 0) hear(t);
+  }
+  // All stood still for 0.3 s: the inertial samples are lost, the wheels' were queued and come all at once.
+  const TimeNs resumed = t + 300 * kMs;
+  for (TimeNs late = 0; late < 4; ++late) {
+    add(resumed + 5 * kMs * late);
+    hear(t + 10 * kMs * late);
+  }
+  for (TimeNs queued = t + 40 * kMs; queued < resumed; queued += 10 * kMs) hear(queued);
+  for (TimeNs now = resumed + 20 * kMs; now < resumed + 500 * kMs; now += 5 * kMs) {
+    add(now);
+    hear(now);
+    if (now > resumed + 200 * kMs) CHECK(newest == now);
+  }
+}
+
+namespace {
+
+/// What comes out of a stream's clock: camera frames each 33 ms, 12 ms after their exposure, or as `delay` says.
+std::vector<Out> run_stream(const Driver& driver, const std::function<TimeNs(TimeNs)>& delay = {},
+                            const std::function<bool(TimeNs)>& time_is_known = {}) {
+  StreamClock clock;
+  std::vector<Out> out;
+  for (TimeNs t = 0; t < kEnd; t += 33 * kMs) {
+    if (driver(t) < 0) continue;
+    const TimeNs arrival = t + (delay ? delay(t) : 12 * kMs);
+    const bool known = !time_is_known || time_is_known(t);
+    const auto stamp = clock.correct(driver(t), known ? std::optional(arrival / (5 * kMs) * (5 * kMs)) : std::nullopt);
+    if (stamp) out.push_back({t, *stamp});
+  }
+  return out;
+}
+
+}  // namespace
+
+TEST_CASE("stream clock: a leap is taken out, but for the first reading after it") {
+  for (const TimeNs leap : {60 * kMs, 100 * kMs, -100 * kMs, 1000 * kMs, -1000 * kMs}) {
+    CAPTURE(leap);
+    const Driver leaping = [leap](TimeNs t) { return amiss(t) ? t + leap : t; };
+    const std::vector<Out> out = run_stream(leaping);
+    CHECK(largest_error(out) < 1e-3);
+    CHECK(out.size() == run_stream(sound).size() - 2);
+  }
+}
+
+TEST_CASE("stream clock: late, missing and repeated readings are left alone") {
+  const auto late = [](TimeNs t) { return amiss(t) ? 212 * kMs : 12 * kMs; };
+  CHECK(largest_error(run_stream(sound, late)) == 0.0);
+  CHECK(run_stream(sound, late).size() == run_stream(sound).size());
+  const Driver gap = [](TimeNs t) { return t >= kLeapAt && t < kLeapAt + 300 * kMs ? TimeNs{-1} : t; };
+  CHECK(largest_error(run_stream(gap)) == 0.0);
+  const Driver every_other = [](TimeNs t) { return amiss(t) && t % (66 * kMs) != 0 ? TimeNs{-1} : t; };
+  CHECK(largest_error(run_stream(every_other)) == 0.0);
+  CHECK(largest_error(run_stream(every_other, late)) == 0.0);
+}
+
+TEST_CASE("stream clock: one false stamp is left out, and clocks that leap together are left alone") {
+  const Driver once = [](TimeNs t) { return t == 2013 * kMs ? t + 200 * kMs : t; };
+  const std::vector<Out> out = run_stream(once);
+  CHECK(largest_error(out) == 0.0);
+  CHECK(out.size() == run_stream(sound).size() - 1);
+
+  const Driver leaping = [](TimeNs t) { return amiss(t) ? t + 100 * kMs : t; };
+  const auto with_all = [](TimeNs t) { return (amiss(t) ? 100 * kMs : 0) + 12 * kMs; };
+  for (const Out& o : run_stream(leaping, with_all)) CHECK(o.stamp == leaping(o.t));
+}
+
+TEST_CASE("stream clock: while nobody knows the time it changes nothing") {
+  const Driver leaping = [](TimeNs t) { return amiss(t) ? t + 100 * kMs : t; };
+  const auto unknown = [](TimeNs t) { return t < kLeapAt - 100 * kMs || t > kLeapAt + 100 * kMs; };
+  for (const Out& o : run_stream(leaping, {}, unknown)) {
+    if (o.t < kBackAt) CHECK(o.stamp == leaping(o.t));
+  }
+}
