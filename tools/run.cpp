@@ -198,7 +198,7 @@ void run(const RunArguments& args) {
     totals.add(frame.t_ns, odometry.health());
     if (frame.estimate) {
       trajectory.write(*frame.estimate);
-      states.write(*frame.estimate);
+      states.write(*frame.estimate, to_text(frame.estimate->health));
     }
     progress.show(progress_line(frame, odometry, recording.span(), wall_time()));
   };

@@ -1,5 +1,6 @@
 #include "src/recording/writers.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
@@ -43,7 +44,7 @@ std::string states_heading() {
          ",tracks,stereo,features_used,features_rejected,clones,wheel_rows_used,wheel_rows_rejected,beams_used,"
          "beams_rejected,standing,on_ground,slope_along,slope_across,sigma_slope_along,sigma_slope_across,"
          "weight_imu,weight_odometer,weight_camera,inconsistency_imu,inconsistency_odometer,inconsistency_camera,"
-         "displacement_variance,disagreement,anomalous\n";
+         "displacement_variance,disagreement,anomalous,mode,health,quality\n";
 }
 
 void append(std::string& line, double value) {
@@ -69,6 +70,12 @@ int anomalous_code(const Consistency& consistency) {
   constexpr int kNobody = 0, kFirstSensor = 1, kOneOfTwo = 4;
   if (consistency.anomalous) return kFirstSensor + static_cast<int>(*consistency.anomalous);
   return consistency.disagree() ? kOneOfTwo : kNobody;
+}
+
+// Column `mode`: what the vehicle does. Free: no wheels carry it, as in flight, or nobody knows of any.
+const char* mode_text(const FrameStatistics& frame) {
+  if (frame.standing) return "standing";
+  return frame.on_ground ? "rolling" : "free";
 }
 
 nlohmann::ordered_json to_json(const std::vector<Warning>& warnings) {
@@ -101,7 +108,7 @@ void TumWriter::write(const NavState& state) {
 
 StatesWriter::StatesWriter(const std::filesystem::path& file) : out_(file) { out_.write(states_heading()); }
 
-void StatesWriter::write(const Estimate& estimate) {
+void StatesWriter::write(const Estimate& estimate, std::string health) {
   const NavState& state = estimate.state;
   std::string line = std::to_string(state.t_ns);
   append(line, state.p_WB);
@@ -137,7 +144,9 @@ void StatesWriter::write(const Estimate& estimate) {
   for (const double coefficient : consistency.coefficient) append(line, coefficient);
   append(line, consistency.variance);
   append(line, consistency.threshold > 0.0 ? consistency.score / consistency.threshold : 0.0);
-  line += "," + std::to_string(anomalous_code(consistency));
+  line += "," + std::to_string(anomalous_code(consistency)) + "," + mode_text(frame);
+  std::replace(health.begin(), health.end(), ',', ';');
+  line += "," + health + "," + std::to_string(estimate.health.quality);
   out_.write(line + "\n");
 }
 

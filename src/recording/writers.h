@@ -38,11 +38,12 @@ class TumWriter {
   OutputFile out_;
 };
 
-/// State, covariance and status of every frame, with a heading that names the columns.
+/// State, covariance, weights, mode and health of every frame, with a heading that names the columns.
 class StatesWriter {
  public:
   explicit StatesWriter(const std::filesystem::path& file);
-  void write(const Estimate& estimate);
+  /// `health`: the estimate's health in words, for people; its commas become semicolons.
+  void write(const Estimate& estimate, std::string health);
 
  private:
   OutputFile out_;

@@ -49,6 +49,19 @@ TEST_CASE("read: the truth of a recording, by its folder") {
   CHECK(truth[1].q_WB.isApprox(Eigen::Quaterniond(0.8, 0, 0, 0.6)));
 }
 
+TEST_CASE("read: weights, and the sensor at fault in words") {
+  const TemporaryFolder folder("weights");
+  const std::string header = "t_ns,p_x,p_y,p_z,q_w,q_x,q_y,q_z,weight_imu,weight_odometer,weight_camera,anomalous\n";
+  folder.write("states.csv", header + "100,1,2,3,1,0,0,0,1,0.25,0,2\n200,1,2,3,1,0,0,0,1,1,1,0\n");
+  const Estimate estimate = read_estimate(folder / "states.csv");
+  CHECK(estimate.anomalous == std::vector<std::string>{"odometer", ""});
+  REQUIRE(estimate.weights.size() == 2);
+  CHECK(estimate.weights[0].odometer == 0.25);
+  CHECK(estimate.weights[0].camera == 0.0);
+  folder.write("states.csv", header + "100,1,2,3,1,0,0,0,1,0.25,0,9\n");
+  CHECK_THROWS_WITH(static_cast<void>(read_estimate(folder / "states.csv")), doctest::Contains("anomalous"));
+}
+
 TEST_CASE("read: a states.csv is read by the names in its header") {
   std::string header = "mode,t_ns,q_w,q_x,q_y,q_z,p_x,p_y,p_z";
   std::string row = "fly,100,1,0,0,0,7,8,9";

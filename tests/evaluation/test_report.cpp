@@ -87,6 +87,24 @@ TEST_CASE("report: stands alone, names everything, escapes what it is given") {
   CHECK(count(page, "class=\"band") == 12);  // three axes of position and of rotation, two estimates
 }
 
+TEST_CASE("report: who is at fault and how far each sensor is trusted, of the estimates that say it") {
+  const Trajectory truth = walk(30.0, 50.0);
+  std::vector<ReportEntry> entries{entry("with", truth, 10.0, 30.0), entry("without", truth, 10.0, 20.0)};
+  const std::size_t poses = entries[0].estimate.poses.size();
+  entries[0].estimate.anomalous.assign(poses, "");
+  std::fill(entries[0].estimate.anomalous.begin() + 50, entries[0].estimate.anomalous.begin() + 60, "odometer");
+  std::fill(entries[0].estimate.anomalous.begin() + 70, entries[0].estimate.anomalous.begin() + 80, "odometer");
+  const std::string before = to_html("t", truth, entries);
+  CHECK(count(before, "class=\"strip") == 1);
+  CHECK(count(before, "<title>odometer</title>") == 2);
+  CHECK_FALSE(contains(before, "weight: IMU"));
+
+  entries[0].estimate.weights.assign(poses, {1.0, 0.5, 1.0});
+  const std::string after = to_html("t", truth, entries);
+  CHECK(contains(after, "weight: IMU"));
+  CHECK(count(after, "<polyline") == count(before, "<polyline") + 3);
+}
+
 TEST_CASE("report: without covariance no bounds and no consistency") {
   const Trajectory truth = walk(30.0, 50.0);
   ReportEntry plain = entry("plain", truth, 10.0, 30.0);

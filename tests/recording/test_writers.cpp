@@ -26,6 +26,7 @@ Estimate numbered_estimate() {
   e.frame = {60, 61, 62, 63, 64, 65, 66, 67, 68, true, true};
   e.terrain = {true, 0.6, 0.7, 0.8, 0.9};
   e.consistency = {{true, true, true}, {0.01, 0.02, 0.03}, {1.0, 0.25, 1.0}, 4e-4, 0.02, 0.01, MotionSensor::odometer};
+  e.health.quality = 75;
   return e;
 }
 
@@ -52,7 +53,7 @@ TEST_CASE("tum: nanoseconds survive, quaternion with w last") {
 
 TEST_CASE("states: every value stands below its name") {
   const TempFolder folder;
-  StatesWriter(folder / "states.csv").write(numbered_estimate());
+  StatesWriter(folder / "states.csv").write(numbered_estimate(), "degraded: without a, b");
   std::ifstream file(folder / "states.csv");
   std::string heading;
   std::string values;
@@ -70,7 +71,7 @@ TEST_CASE("states: every value stands below its name") {
   }
   CHECK_FALSE(std::getline(fields, field, ','));
 
-  CHECK(row.size() == 1 + 3 + 4 + 9 + 21 + 9 + 11 + 4 + 9);
+  CHECK(row.size() == 1 + 3 + 4 + 9 + 21 + 9 + 11 + 4 + 9 + 3);
   CHECK(row["t_ns"] == "1403715273262142976");
   CHECK(row["p_z"] == "3");
   CHECK(row["q_w"] == "0.5");
@@ -99,6 +100,9 @@ TEST_CASE("states: every value stands below its name") {
   CHECK(row["displacement_variance"] == "0.0004");
   CHECK(row["disagreement"] == "2");
   CHECK(row["anomalous"] == "2");
+  CHECK(row["mode"] == "standing");
+  CHECK(row["health"] == "degraded: without a; b");
+  CHECK(row["quality"] == "75");
 }
 
 TEST_CASE("summary: valid JSON with all that was said") {

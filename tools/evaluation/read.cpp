@@ -126,6 +126,34 @@ std::vector<std::string> read_labels(const TextTable& table, const std::string& 
   return labels;
 }
 
+/// Column `anomalous` of docs/recordings.md in words.
+std::vector<std::string> read_anomalous(const TextTable& table) {
+  constexpr std::array<const char*, 5> kTexts{"", "imu", "odometer", "camera", "one of two"};
+  const std::optional<std::size_t> column = table.column("anomalous");
+  if (!column) return {};
+  std::vector<std::string> labels;
+  for (const Row& row : table.rows()) {
+    const double code = table.number(row, *column, "anomalous");
+    if (!(code >= 0.0 && code < kTexts.size() && code == std::floor(code)))
+      table.fail(row, *column, "anomalous", "not one of 0 to 4");
+    labels.emplace_back(kTexts[static_cast<std::size_t>(code)]);
+  }
+  return labels;
+}
+
+/// One entry per row, or nothing if the file has no weights. All three must be there.
+std::vector<SensorWeights> read_weights(const TextTable& table) {
+  if (!table.column("weight_imu")) return {};
+  const std::size_t imu = table.required_column("weight_imu");
+  const std::size_t odometer = table.required_column("weight_odometer");
+  const std::size_t camera = table.required_column("weight_camera");
+  std::vector<SensorWeights> weights;
+  for (const Row& row : table.rows())
+    weights.push_back({table.number(row, imu, "weight_imu"), table.number(row, odometer, "weight_odometer"),
+                       table.number(row, camera, "weight_camera")});
+  return weights;
+}
+
 /// The file of an estimate or truth given by its folder; a file is itself.
 fs::path file_in(const fs::path& path, const std::vector<fs::path>& candidates) {
   if (!fs::exists(path)) throw std::runtime_error(path.string() + ": does not exist");
@@ -196,6 +224,8 @@ Estimate read_estimate(const fs::path& path) {
   estimate.terrain = read_terrain_estimates(table);
   estimate.mode = read_labels(table, "mode");
   estimate.health = read_labels(table, "health");
+  estimate.anomalous = read_anomalous(table);
+  estimate.weights = read_weights(table);
   return estimate;
 }
 

@@ -16,7 +16,8 @@ namespace ear::evaluation {
 [[nodiscard]] std::vector<TerrainTruth> read_terrain(const std::filesystem::path& recording);
 
 /// An estimate: the output folder of a run (states.csv if it is there, else estimate.tum), or any file that read_truth
-/// takes. Only a states.csv holds covariance, ground, mode and health. The name stays empty: see distinct_names().
+/// takes. Only a states.csv holds covariance, ground, mode, health and weights. The name stays empty: see
+/// distinct_names().
 [[nodiscard]] Estimate read_estimate(const std::filesystem::path& path);
 
 /// Short names that tell the paths apart: the stem; where stems are equal, as many folders above it as it takes.

@@ -6,6 +6,7 @@
 #include <functional>
 #include <map>
 #include <sstream>
+#include <utility>
 
 #include "tools/evaluation/plot.h"
 #include "tools/evaluation/report_page.h"
@@ -117,11 +118,16 @@ std::string stacked(std::vector<Plot> plots, const std::string& x_label) {
 std::vector<Stretch> stretches(const Trajectory& truth, const Evaluation& evaluation,
                                const std::vector<std::string>& labels,
                                const std::map<std::string, std::size_t>& colours) {
+  constexpr int kNoSegment = -1;
   std::vector<Stretch> result;
-  int segment = -1;
+  int segment = kNoSegment;
   for (const Frame& frame : evaluation.frames) {
     const std::string& text = labels[frame.match.index];
     const double t = seconds_since_start(truth, frame);
+    if (text.empty()) {  // nothing to say
+      segment = kNoSegment;
+      continue;
+    }
     const bool joined = !result.empty() && frame.match.segment == segment;
     if (joined) result.back().to = t;
     if (!joined || result.back().text != text)
@@ -135,8 +141,9 @@ std::vector<Stretch> stretches(const Trajectory& truth, const Evaluation& evalua
 std::map<std::string, std::size_t> label_colours(const std::vector<ReportEntry>& entries) {
   std::map<std::string, std::size_t> colours;
   for (const ReportEntry& entry : entries)
-    for (const auto* labels : {&entry.estimate.mode, &entry.estimate.health})
-      for (const std::string& text : *labels) colours.emplace(text, colours.size());
+    for (const auto* labels : {&entry.estimate.mode, &entry.estimate.health, &entry.estimate.anomalous})
+      for (const std::string& text : *labels)
+        if (!text.empty()) colours.emplace(text, colours.size());
   return colours;
 }
 
@@ -151,8 +158,34 @@ std::string strips(const Trajectory& truth, const std::vector<ReportEntry>& entr
     };
     add("mode", entries[i].estimate.mode);
     add("health", entries[i].estimate.health);
+    add("at fault", entries[i].estimate.anomalous);
   }
   return out;
+}
+
+/// The trust in each sensor over time, of the estimates that say it.
+std::string weight_panels(const Trajectory& truth, const std::vector<ReportEntry>& entries, const Range& time) {
+  const std::vector<std::pair<std::string, double SensorWeights::*>> sensors{
+      {"weight: IMU", &SensorWeights::imu}, {"odometer", &SensorWeights::odometer}, {"camera", &SensorWeights::camera}};
+  std::vector<Plot> plots;
+  for (const auto& [label, weight] : sensors) {
+    Plot plot;
+    plot.width = kWidth;
+    plot.height = 80.0;
+    plot.y_label = label;
+    plot.x_range = time;
+    plot.y_range = {-0.1, 1.1};
+    for (std::size_t i = 0; i < entries.size(); ++i) {
+      if (entries[i].estimate.weights.empty()) continue;
+      plot.curves.push_back(curve_of(
+          i, entries[i], [&](const ReportEntry&, const Frame& f) { return seconds_since_start(truth, f); },
+          [sensor = weight](const ReportEntry& e, const Frame& f) {
+            return e.estimate.weights[f.match.index].*sensor;
+          }));
+    }
+    if (!plot.curves.empty()) plots.push_back(plot);
+  }
+  return plots.empty() ? "" : stacked(plots, "time [s]");
 }
 
 // The sections of the page.
@@ -255,8 +288,9 @@ std::string position_section(const Trajectory& truth, const std::vector<ReportEn
   return section(
       "Position error",
       "True minus estimated in the axes of the estimate's world, first poses aligned. Shaded: three standard "
-      "deviations, as the estimate gives them.",
-      "t [s]", stacked(plots, "time [s]") + strips(truth, entries, time));
+      "deviations, as the estimate gives them. Below, where the estimate says it: what the vehicle does, its health, "
+      "the sensor at fault, and the weight of each sensor (1: trusted; 0: it told nothing).",
+      "t [s]", stacked(plots, "time [s]") + strips(truth, entries, time) + weight_panels(truth, entries, time));
 }
 
 std::string rotation_section(const Trajectory& truth, const std::vector<ReportEntry>& entries, const Range& time) {

@@ -45,14 +45,23 @@ struct TerrainEstimate {
   Slope sigma;                 ///< standard deviations of the slope
 };
 
+/// Trust in each of the sensors that tell of motion: 1 full, 0 it told nothing.
+struct SensorWeights {
+  double imu = 1.0;
+  double odometer = 1.0;
+  double camera = 1.0;
+};
+
 /// One estimated trajectory. All vectors but the poses are empty, or have one entry per pose.
 struct Estimate {
   std::string name;
   Trajectory poses;
   std::vector<PoseCovariance> covariance;
   std::vector<TerrainEstimate> terrain;
-  std::vector<std::string> mode;    ///< what the estimator says it does, as written in its file
-  std::vector<std::string> health;  ///< how well it says it does it
+  std::vector<std::string> mode;       ///< what the estimator says it does, as written in its file
+  std::vector<std::string> health;     ///< how well it says it does it
+  std::vector<std::string> anomalous;  ///< which sensor it takes for the one at fault; "" for none
+  std::vector<SensorWeights> weights;
 };
 
 }  // namespace ear::evaluation
