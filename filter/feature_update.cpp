@@ -63,9 +63,17 @@ void camera_poses(const State& x, std::vector<CameraPose>& poses) {
 
 LinearizedObservation linearize_observation(const State& x, int clone, int camera, const InverseDepthPoint& point,
                                             const Eigen::Vector2d& uv) {
-  const Pose& T_WB = x.clones[static_cast<std::size_t>(clone)].T_WB;
-  const Pose& T_BC0 = x.camera.T_BC0;
-  const Pose& T_C0C1 = x.camera.T_C0C1;
+  const Clone& seen_from = x.clones[static_cast<std::size_t>(clone)];
+  LinearizedObservation z = linearize_observation(seen_from.T_WB, x.camera, camera, point, uv);
+  z.clone = clone;
+  z.noise = seen_from.feature_noise;
+  return z;
+}
+
+LinearizedObservation linearize_observation(const Pose& T_WB, const CameraState& cameras, int camera,
+                                            const InverseDepthPoint& point, const Eigen::Vector2d& uv) {
+  const Pose& T_BC0 = cameras.T_BC0;
+  const Pose& T_C0C1 = cameras.T_C0C1;
   const double s = point.inverse_depth;  // all points below are times s: finite at infinity
   const Eigen::Vector3d f_W = point.scaled_W();
   const Eigen::Vector3d f_B = T_WB.R.transpose() * (f_W - s * T_WB.p);
@@ -77,8 +85,6 @@ LinearizedObservation linearize_observation(const State& x, int clone, int camer
 
   const double w = 1.0 / h.z();
   LinearizedObservation z;
-  z.clone = clone;
-  z.noise = x.clones[static_cast<std::size_t>(clone)].feature_noise;
   z.residual = uv - h.head<2>() * w;
   Eigen::Matrix<double, 2, 3> J_C;  // d uv / d h
   J_C << w, 0.0, -h.x() * w * w, 0.0, w, -h.y() * w * w;

@@ -29,7 +29,11 @@ struct LinearizedObservation {
 /// Poses of both cameras for every clone: index 2 * clone + camera.
 void camera_poses(const State& x, std::vector<CameraPose>& poses);
 
-/// Linearizes the observation of `point` in camera 0 or 1 of clone number `clone`.
+/// Linearizes the observation of `point` in camera 0 or 1 of a body at T_WB.
+[[nodiscard]] LinearizedObservation linearize_observation(const Pose& T_WB, const CameraState& cameras, int camera,
+                                                          const InverseDepthPoint& point, const Eigen::Vector2d& uv);
+
+/// The same, seen from clone number `clone`.
 [[nodiscard]] LinearizedObservation linearize_observation(const State& x, int clone, int camera,
                                                           const InverseDepthPoint& point, const Eigen::Vector2d& uv);
 

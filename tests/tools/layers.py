@@ -13,6 +13,7 @@ STANDARD = ["freestanding", "hosted"]  # the C++ library; the filter has only th
 LAYERS = {
     "include/ear/": ["include/ear/", "eigen", *STANDARD],
     "filter/": ["filter/", "include/ear/", "eigen", "freestanding"],
+    "smoother/": ["smoother/", "filter/", "include/ear/", "eigen", "ceres", "freestanding"],
     "frontend/": ["frontend/", "include/ear/", "eigen", "opencv", *STANDARD],
     "src/": ["src/", "filter/", "frontend/", "include/ear/", "eigen", "opencv", "spdlog", *STANDARD],
     "src/recording/": ["src/recording/", "include/ear/", "eigen", "opencv", "yaml-cpp", "json", "spdlog", *STANDARD],
@@ -21,7 +22,7 @@ LAYERS = {
     "tools/simulator/": ["tools/simulator/", "include/ear/", "eigen", "opencv", *STANDARD],
     "tools/evaluation/": ["tools/evaluation/", "include/ear/", "eigen", "json", *STANDARD],
 }
-EVERYTHING = [*LAYERS, "eigen", "opencv", "yaml-cpp", "json", "spdlog", "posix", *STANDARD]
+EVERYTHING = [*LAYERS, "eigen", "opencv", "yaml-cpp", "json", "spdlog", "posix", "ceres", *STANDARD]
 LAYERS["tools/"] = ["tools/", "cli11", *EVERYTHING]
 LAYERS["tests/"] = ["tests/", "tools/", "doctest", *EVERYTHING]
 LAYERS["tests/tools/consumer/"] = ["include/ear/", "filter/", *STANDARD]
@@ -33,7 +34,7 @@ HOSTED = ["atomic", "chrono", "condition_variable", "cstdio", "ctime", "filesyst
           "mutex", "shared_mutex", "thread"]
 
 LIBRARIES = {"Eigen": "eigen", "unsupported": "eigen", "opencv2": "opencv", "yaml-cpp": "yaml-cpp", "spdlog": "spdlog",
-             "nlohmann": "json", "CLI": "cli11", "doctest": "doctest", "sys": "posix"}
+             "nlohmann": "json", "CLI": "cli11", "doctest": "doctest", "sys": "posix", "ceres": "ceres", "glog": "ceres"}
 
 INCLUDE = re.compile(r'^\s*#\s*include\s*["<]([^">]+)[">]')
 
