@@ -305,6 +305,7 @@ bool Filter::begin_frame(const FeatureFrame& frame, bool frozen) {
   any_frame_ = true;
   last_frame_ns_ = frame.t_ns;
   statistics_ = FrameStatistics{};
+  feature_noise_ = noise_of(frame);
   consistency_ = Consistency{};
   log_.start_frame();
   statistics_.tracks = static_cast<int>(frame.features.size());

@@ -28,6 +28,7 @@
 #include "filter/feature_update.h"
 #include "filter/frame_check.h"
 #include "filter/health_monitor.h"
+#include "filter/image_noise.h"
 #include "filter/impact_guard.h"
 #include "filter/imu_buffer.h"
 #include "filter/imu_clock.h"
@@ -189,6 +190,7 @@ class Filter {
   [[nodiscard]] bool repeats_last_image(const FeatureFrame& frame) const;
   [[nodiscard]] Pose motion_since_image() const;
   void bridge(const FeatureFrame& frame);
+  [[nodiscard]] double noise_of(const FeatureFrame& frame);
   [[nodiscard]] FrameAgreement check_frame(const FeatureFrame& frame);
   void go_on_blind(bool still);
   void use_image(const FeatureFrame& frame, bool still);
@@ -252,6 +254,8 @@ class Filter {
   CameraDisplacement camera_displacement_;
   Consistency consistency_;  ///< over the interval that ends with the frame at hand
   TimeNs compared_ns_ = 0;   ///< where that ends
+  ImageNoise image_noise_;
+  double feature_noise_ = 1.0;  ///< standard deviation of the features of the frame at hand, times the usual
   FrameCheck frame_check_;
   HealthMonitor monitor_;
   MovingStart moving_start_;

@@ -15,6 +15,7 @@ constexpr double kBridgePosition = 5e-3;     // [m] well above what the features
 constexpr std::size_t kFewestRepeated = 8;   // features, for two images to be the same
 constexpr double kOldImage = 0.5;            // [s] after which frames have little in common
 constexpr double kCommonShare = 0.5;         // of its features, that the elder of a copy must have seen
+constexpr double kNoisy = 1.25;              // times the usual standard deviation of a feature: less may be chance
 constexpr std::size_t kMinObservations = 2;  // clones that must have seen a feature
 
 }  // namespace
@@ -72,6 +73,13 @@ void Filter::bridge(const FeatureFrame& frame) {
   update(H, 0, r);
 }
 
+/// By how much the features are less exact than they usually are: 1 if they are not.
+double Filter::noise_of(const FeatureFrame& frame) {
+  if (calibration_.cameras.size() < 2) return 1.0;
+  const double ratio = image_noise_.measure(frame, state_.camera) * focal_px_ / config_.feature_sigma_px;
+  return ratio > kNoisy ? ratio : 1.0;
+}
+
 /// At the state's time, which is the frame's, before the frame changes it: does it show the motion since the last image
 /// that the other sensors predict?
 FrameAgreement Filter::check_frame(const FeatureFrame& frame) {
@@ -80,7 +88,9 @@ FrameAgreement Filter::check_frame(const FeatureFrame& frame) {
   const Pose moved = motion_since_image();
   const double sigma_v = std::sqrt(covariance_.matrix().diagonal().segment<3>(err::nu).maxCoeff());
   const PredictedMotion motion{moved.R, moved.p, dt * sigma_v};
-  return frame_check_.compare(last_features_, frame, motion, state_.camera);
+  FrameAgreement agreement = frame_check_.compare(last_features_, frame, motion, state_.camera, feature_noise_);
+  agreement.noise = feature_noise_;
+  return agreement;
 }
 
 /// The state is at the frame's time.
@@ -145,7 +155,7 @@ void Filter::append_clone() {
   Eigen::Matrix<double, 6, 1> J_offset;  // the frame was taken a moment later than thought: the vehicle moved on
   J_offset << rate_W, x.v_W + x.p_WB.cross(rate_W);
   covariance_.append_clone(J_imu, J_offset);
-  state_.clones.push_back({next_frame_++, {x.R_WB, x.p_WB}, 1.0 / trust(MotionSensor::camera)});
+  state_.clones.push_back({next_frame_++, {x.R_WB, x.p_WB}, feature_noise_ / trust(MotionSensor::camera)});
   learn_calibration_ = !monitor_.health().untrusted[index_of(Source::camera_left)];
   clone_is_here_ = true;
 }

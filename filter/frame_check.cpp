@@ -17,8 +17,9 @@ double share(int part, int of) { return of > 0 ? static_cast<double>(part) / of 
 }  // namespace
 
 FrameAgreement FrameCheck::compare(const FeatureFrame& from, const FeatureFrame& to, const PredictedMotion& motion,
-                                   const CameraState& cameras) {
+                                   const CameraState& cameras, double noise) {
   FrameAgreement result;
+  const double sigma = noise * sigma_;
   match_stereo(from, to, matches_);
   result.matches = static_cast<int>(matches_.size());
   if (matches_.size() < kFewest) return result;
@@ -34,9 +35,9 @@ FrameAgreement FrameCheck::compare(const FeatureFrame& from, const FeatureFrame&
     const double s = stereo_inverse_depth(cameras, match.left0, match.right0);
     // Noise of this observation and of the one that it starts from; of the depth, whose error the way makes visible;
     // of the way itself.
-    const double sigma_s = std::sqrt(2.0) * sigma_ / baseline;
+    const double sigma_s = std::sqrt(2.0) * sigma / baseline;
     if (s < -4.0 * sigma_s) ++behind;
-    const double variance = 2.0 * sigma_ * sigma_ + std::pow(way * sigma_s, 2) + std::pow(s * motion.sigma_p, 2);
+    const double variance = 2.0 * sigma * sigma + std::pow(way * sigma_s, 2) + std::pow(s * motion.sigma_p, 2);
     const Eigen::Vector3d g = T_BC0.R * match.left0.homogeneous() + s * T_BC0.p;
     const Eigen::Vector3d moved = motion.R_B0B1.transpose() * (g - s * motion.p_B0B1);
     const auto residual = [&](const Pose& T_BC, const Eigen::Vector2d& uv, Eigen::Matrix<double, 2, 3>& J_turn) {

@@ -23,7 +23,8 @@ struct FrameAgreement {
   double left = 0.0;    ///< share of them that are not where they were expected: left camera
   double right = 0.0;   ///< right camera
   double behind = 0.0;  ///< share of the stereo features that the geometry puts behind the cameras
-  bool frozen = false;  ///< the image is exactly the one before; whoever compares frames finds that out first
+  double noise = 1.0;   ///< of the features, times the usual; whoever compares frames finds that out first
+  bool frozen = false;  ///< the image is exactly the one before; the same
   Eigen::Vector3d turn = Eigen::Vector3d::Zero();  ///< by which the vehicle turned more than predicted [rad], in B
   double turn_sigma = 0.0;                         ///< [rad] its standard deviation, the worst axis; 0: not known
 };
@@ -33,8 +34,9 @@ class FrameCheck {
  public:
   FrameCheck(double sigma, double gate) : sigma_(sigma), gate_(gate) {}
 
+  /// `noise`: of the features, times the usual.
   [[nodiscard]] FrameAgreement compare(const FeatureFrame& from, const FeatureFrame& to, const PredictedMotion& motion,
-                                       const CameraState& cameras);
+                                       const CameraState& cameras, double noise = 1.0);
 
  private:
   double sigma_, gate_;

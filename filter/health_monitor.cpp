@@ -8,10 +8,14 @@ namespace {
 
 constexpr double kLongest = 0.25;    // [s] that one piece of evidence may count
 constexpr double kMajority = 0.5;    // of the measurements of a wheel or beam
-constexpr double kManyOff = 0.3;     // of the features off their place: a camera is in doubt
+constexpr double kSomeOff = 0.1;     // of the features off their place: a camera is in doubt
+constexpr double kManyOff = 0.3;     // it carries the estimate no more
 constexpr double kMostOff = 0.5;     // and contradicts the state
+constexpr double kNoisy = 1.5;       // times the usual noise of a feature: as little
 constexpr double kFewStereo = 0.25;  // of the features: less are seen by the right camera
 constexpr int kFewTracks = 10;
+constexpr double kSparse = 0.4;         // of the usual number of features: less are seen
+constexpr double kTracksMemory = 20.0;  // [s]
 constexpr double kSilent = 0.12;  // [s] without a frame, and kMissedFrames of its intervals
 constexpr double kMissedFrames = 2.5;
 constexpr double kStale = 0.5;          // [s] after which what the last frame said holds no more
@@ -130,8 +134,13 @@ void HealthMonitor::accuse_imu(bool gyro, bool accel, TimeNs t_ns) {
 }
 
 void HealthMonitor::accuse_cameras(TimeNs t_ns) {
-  for (std::size_t camera = 0; camera < cameras_; ++camera) trust_[camera].accuse(t_ns);
+  accuse_images(t_ns);
   decide(t_ns);
+}
+
+void HealthMonitor::accuse_images(TimeNs t_ns) {
+  for (std::size_t camera = 0; camera < cameras_; ++camera) trust_[camera].accuse(t_ns);
+  carrying_.accuse(t_ns);
 }
 
 void HealthMonitor::add_encoder(const EncoderSample& sample, Verdict verdict, TimeNs imu_ns) {
@@ -170,6 +179,7 @@ void HealthMonitor::add_refused_frame(TimeNs imu_ns) {
 void HealthMonitor::note_silence(TimeNs t_ns) {
   if (!last_frame_ns_ || images_come(t_ns)) return;
   for (std::size_t camera = 0; camera < cameras_; ++camera) trust_[camera].add(true, t_ns);
+  carrying_.add(true, t_ns);
   for (const Source source : {Source::gyroscope, Source::accelerometer}) trust(source).add(false, t_ns);
   decide(t_ns);
 }
@@ -188,9 +198,7 @@ void HealthMonitor::add_frame(const Frame& frame, const std::array<SourceRecord,
     judge_cameras(frame);
     late_ = camera_stamps_unusual_ && !camera_stamps_wrong_ && frame.agreement.matches > 0 &&
             frame.agreement.left < kManyOff;
-    if (camera_stamps_unusual_) {
-      for (std::size_t camera = 0; camera < cameras_; ++camera) trust_[camera].accuse(t_ns);
-    }
+    if (camera_stamps_unusual_) accuse_images(t_ns);
   }
   judge_turn(frame);
   if (wheels_) judge_ground(frame, records);
@@ -217,15 +225,19 @@ void HealthMonitor::judge_cameras(const Frame& frame) {
   const TimeNs t_ns = frame.t_ns;
   const FrameAgreement& seen = frame.agreement;
   const bool known = frame.running && seen.matches > 0;
-  const bool blind = frame.statistics.tracks < kFewTracks;
-  trust(Source::camera_left).add(blind || (known && seen.left > kManyOff), t_ns);
+  const int tracks = frame.statistics.tracks;
+  const bool blind = tracks < kFewTracks;
+  const bool poor = blind || tracks < kSparse * usual_tracks_ || seen.noise > kNoisy;
+  const double share = std::max(frame_interval_ / kTracksMemory, 1.0 / (1.0 + frames_counted_));
+  usual_tracks_ += share * (tracks - usual_tracks_);
+  ++frames_counted_;
+  carrying_.add(blind || (known && seen.left > kManyOff), t_ns);
+  trust(Source::camera_left).add(poor || (known && seen.left > kSomeOff), t_ns);
   if (cameras_ == 2) {
-    const bool one_eyed = frame.statistics.stereo < kFewStereo * frame.statistics.tracks;
-    trust(Source::camera_right).add(blind || one_eyed || (known && seen.right > kManyOff), t_ns);
+    const bool one_eyed = frame.statistics.stereo < kFewStereo * tracks;
+    trust(Source::camera_right).add(poor || one_eyed || (known && seen.right > kSomeOff), t_ns);
   }
-  if (seen.frozen || (known && crossed(seen))) {
-    for (std::size_t camera = 0; camera < cameras_; ++camera) trust_[camera].accuse(t_ns);
-  }
+  if (seen.frozen || (known && crossed(seen))) accuse_images(t_ns);
 }
 
 /// Wheels and beams have something to say on the ground only.
@@ -289,7 +301,7 @@ void HealthMonitor::decide(TimeNs t_ns) {
     aided_ns_ = fitting_ns_ = t_ns;
   }
   const FrameStatistics frame = seconds_between(last_.t_ns, t_ns) < kStale ? last_.statistics : FrameStatistics{};
-  const bool cameras = images_come(t_ns) && frame.tracks >= kFewTracks && (trusted(Source::camera_left) || late_);
+  const bool cameras = images_come(t_ns) && frame.tracks >= kFewTracks && (carrying_.trusted() || late_);
   const bool wheels = wheels_ && frame.on_ground && (trusted(Source::wheel_left) || trusted(Source::wheel_right)) &&
                       frame.wheel_rows_used > 0;
   health_.aiding = frame.standing      ? Aiding::standing

@@ -100,6 +100,7 @@ class HealthMonitor {
 
  private:
   void judge_cameras(const Frame& frame);
+  void accuse_images(TimeNs t_ns);
   void judge_ground(const Frame& frame, const std::array<SourceRecord, kSourceCount>& records);
   void judge_turn(const Frame& frame);
   void note_silence(TimeNs t_ns);
@@ -115,6 +116,7 @@ class HealthMonitor {
   std::size_t beams_;
   bool wheels_;
   std::array<Trust, kSourceCount> trust_;
+  Trust carrying_;  ///< do the images carry the estimate? They may, where some of what they show is wrong
   Health health_;
   Frame last_;
 
@@ -128,6 +130,8 @@ class HealthMonitor {
   std::array<int, kMaxBeams> repeated_{};
   std::array<bool, kMaxBeams> no_return_{};
   StampWatch camera_stamps_, encoder_stamps_, laser_stamps_;
+  double usual_tracks_ = 0.0;
+  int frames_counted_ = 0;
   bool camera_stamps_unusual_ = false;
   bool camera_stamps_wrong_ = false;
   bool late_ = false;                                    ///< the last image came late, and fits

@@ -1,0 +1,67 @@
+#include <doctest/doctest.h>
+
+#include <cmath>
+#include <random>
+
+#include "filter/image_noise.h"
+#include "filter/so3.h"
+
+using namespace ear;
+
+namespace {
+
+/// A rig whose right camera looks a little elsewhere; points at 1 to 8 m; noise of both coordinates in both cameras.
+FeatureFrame look(const CameraState& cameras, int points, double sigma, std::uint64_t seed) {
+  std::mt19937_64 rng(seed);
+  std::normal_distribution<double> noise(0.0, sigma);
+  std::uniform_real_distribution<double> across(-0.6, 0.6), depth(1.0, 8.0);
+  FeatureFrame frame;
+  for (int i = 0; i < points; ++i) {
+    const double z = depth(rng);
+    const Eigen::Vector3d p_C0 = {z * across(rng), z * across(rng), z};
+    const Eigen::Vector3d p_C1 = cameras.T_C0C1.R.transpose() * (p_C0 - cameras.T_C0C1.p);
+    FeatureObservation feature;
+    feature.id = static_cast<std::uint64_t>(i);
+    feature.left = p_C0.hnormalized() + Eigen::Vector2d(noise(rng), noise(rng));
+    feature.right = p_C1.hnormalized() + Eigen::Vector2d(noise(rng), noise(rng));
+    feature.has_right = true;
+    frame.features.push_back(feature);
+  }
+  return frame;
+}
+
+CameraState make_rig() {
+  CameraState cameras;
+  cameras.T_C0C1.R = exp_so3({0.01, -0.02, 0.015});
+  cameras.T_C0C1.p = {0.05, 0.002, -0.001};
+  return cameras;
+}
+
+}  // namespace
+
+TEST_CASE("image noise: what is measured is what there is, in the mean over frames") {
+  ImageNoise image_noise;
+  for (const double sigma : {1e-3, 4e-3}) {
+    double sum = 0.0;
+    for (std::uint64_t seed = 0; seed < 200; ++seed) {
+      sum += image_noise.measure(look(make_rig(), 100, sigma, seed), make_rig());
+    }
+    CHECK(sum / 200.0 == doctest::Approx(sigma).epsilon(0.03));
+  }
+}
+
+TEST_CASE("image noise: a calibration that is off in pitch by ten times the noise is no noise") {
+  CameraState given = make_rig();
+  given.T_C0C1.R = given.T_C0C1.R * exp_so3({0.01, 0.0, 0.0});
+  ImageNoise image_noise;
+  CHECK(image_noise.measure(look(make_rig(), 150, 1e-3, 1), given) < 2e-3);
+}
+
+TEST_CASE("image noise: a third of wrong matches does not make it twice as large, few features tell nothing") {
+  FeatureFrame frame = look(make_rig(), 150, 1e-3, 2);
+  for (std::size_t i = 0; i < 50; ++i) frame.features[3 * i].right.y() += 0.05 * (i % 2 == 0 ? 1.0 : -1.0);
+  ImageNoise image_noise;
+  CHECK(image_noise.measure(frame, make_rig()) < 2e-3);
+  frame.features.resize(19);
+  CHECK(image_noise.measure(frame, make_rig()) == 0.0);
+}
