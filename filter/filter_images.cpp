@@ -83,13 +83,17 @@ double Filter::noise_of(const FeatureFrame& frame) {
 /// At the state's time, which is the frame's, before the frame changes it: does it show the motion since the last image
 /// that the other sensors predict?
 FrameAgreement Filter::check_frame(const FeatureFrame& frame) {
+  FrameAgreement agreement;
+  if (calibration_.cameras.size() < 2) return agreement;
   const double dt = seconds_between(last_image_ns_, frame.t_ns);
-  if (!any_image_ || dt > kOldImage || calibration_.cameras.size() < 2) return FrameAgreement{};
-  const Pose moved = motion_since_image();
-  const double sigma_v = std::sqrt(covariance_.matrix().diagonal().segment<3>(err::nu).maxCoeff());
-  const PredictedMotion motion{moved.R, moved.p, dt * sigma_v};
-  FrameAgreement agreement = frame_check_.compare(last_features_, frame, motion, state_.camera, feature_noise_);
+  if (any_image_ && dt <= kOldImage) {
+    const Pose moved = motion_since_image();
+    const double sigma_v = std::sqrt(covariance_.matrix().diagonal().segment<3>(err::nu).maxCoeff());
+    const PredictedMotion motion{moved.R, moved.p, dt * sigma_v};
+    agreement = frame_check_.compare(last_features_, frame, motion, state_.camera, feature_noise_);
+  }
   agreement.noise = feature_noise_;
+  agreement.behind = frame_check_.share_behind(frame, state_.camera, feature_noise_);
   return agreement;
 }
 

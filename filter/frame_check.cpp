@@ -16,6 +16,18 @@ double share(int part, int of) { return of > 0 ? static_cast<double>(part) / of 
 
 }  // namespace
 
+double FrameCheck::share_behind(const FeatureFrame& frame, const CameraState& cameras, double noise) const {
+  const double sigma_s = std::sqrt(2.0) * noise * sigma_ / cameras.T_C0C1.p.norm();
+  std::size_t seen = 0;
+  int behind = 0;
+  for (const FeatureObservation& feature : frame.features) {
+    if (!feature.has_right) continue;
+    ++seen;
+    behind += stereo_inverse_depth(cameras, feature.left, feature.right) < -4.0 * sigma_s ? 1 : 0;
+  }
+  return seen < kFewest ? 0.0 : share(behind, static_cast<int>(seen));
+}
+
 FrameAgreement FrameCheck::compare(const FeatureFrame& from, const FeatureFrame& to, const PredictedMotion& motion,
                                    const CameraState& cameras, double noise) {
   FrameAgreement result;
@@ -28,7 +40,7 @@ FrameAgreement FrameCheck::compare(const FeatureFrame& from, const FeatureFrame&
   const Pose T_BC1 = {T_BC0.R * cameras.T_C0C1.R, T_BC0.R * cameras.T_C0C1.p + T_BC0.p};
   const double baseline = cameras.T_C0C1.p.norm();
   const double way = motion.p_B0B1.norm();
-  int off_left = 0, off_right = 0, seen_right = 0, behind = 0;
+  int off_left = 0, off_right = 0, seen_right = 0;
   Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
   Eigen::Vector3d b = Eigen::Vector3d::Zero();
   for (const StereoMatch& match : matches_) {
@@ -36,7 +48,6 @@ FrameAgreement FrameCheck::compare(const FeatureFrame& from, const FeatureFrame&
     // Noise of this observation and of the one that it starts from; of the depth, whose error the way makes visible;
     // of the way itself.
     const double sigma_s = std::sqrt(2.0) * sigma / baseline;
-    if (s < -4.0 * sigma_s) ++behind;
     const double variance = 2.0 * sigma * sigma + std::pow(way * sigma_s, 2) + std::pow(s * motion.sigma_p, 2);
     const Eigen::Vector3d g = T_BC0.R * match.left0.homogeneous() + s * T_BC0.p;
     const Eigen::Vector3d moved = motion.R_B0B1.transpose() * (g - s * motion.p_B0B1);
@@ -63,7 +74,6 @@ FrameAgreement FrameCheck::compare(const FeatureFrame& from, const FeatureFrame&
   }
   result.left = share(off_left, result.matches);
   result.right = share(off_right, seen_right);
-  result.behind = share(behind, result.matches);
   const double least = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(A).eigenvalues()(0);
   if (least > 1.0) {
     result.turn = A.ldlt().solve(b);

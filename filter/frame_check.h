@@ -22,9 +22,10 @@ struct FrameAgreement {
   int matches = 0;      ///< features seen by both cameras in the first frame, by the left one in the second
   double left = 0.0;    ///< share of them that are not where they were expected: left camera
   double right = 0.0;   ///< right camera
+  // What the image tells by itself, whatever came before.
+  double noise = 1.0;   ///< of the features, times the usual
   double behind = 0.0;  ///< share of the stereo features that the geometry puts behind the cameras
-  double noise = 1.0;   ///< of the features, times the usual; whoever compares frames finds that out first
-  bool frozen = false;  ///< the image is exactly the one before; the same
+  bool frozen = false;  ///< the image is exactly the one before
   Eigen::Vector3d turn = Eigen::Vector3d::Zero();  ///< by which the vehicle turned more than predicted [rad], in B
   double turn_sigma = 0.0;                         ///< [rad] its standard deviation, the worst axis; 0: not known
 };
@@ -34,7 +35,10 @@ class FrameCheck {
  public:
   FrameCheck(double sigma, double gate) : sigma_(sigma), gate_(gate) {}
 
+  /// Share of the frame's stereo features that are behind the cameras: most, if left and right were exchanged.
   /// `noise`: of the features, times the usual.
+  [[nodiscard]] double share_behind(const FeatureFrame& frame, const CameraState& cameras, double noise = 1.0) const;
+
   [[nodiscard]] FrameAgreement compare(const FeatureFrame& from, const FeatureFrame& to, const PredictedMotion& motion,
                                        const CameraState& cameras, double noise = 1.0);
 

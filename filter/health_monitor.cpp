@@ -40,7 +40,7 @@ constexpr double kWorstDirection = 0.2;  // [rad] or of its direction, if more: 
 constexpr double kContradicted = 1.0;    // [s]
 
 /// Left and right exchanged: what both see lies behind them.
-bool crossed(const FrameAgreement& seen) { return seen.matches > 0 && seen.behind > kMajority; }
+bool crossed(const FrameAgreement& seen) { return seen.behind > kMajority; }
 
 }  // namespace
 
@@ -237,7 +237,7 @@ void HealthMonitor::judge_cameras(const Frame& frame) {
     const bool one_eyed = frame.statistics.stereo < kFewStereo * tracks;
     trust(Source::camera_right).add(poor || one_eyed || (known && seen.right > kSomeOff), t_ns);
   }
-  if (seen.frozen || (known && crossed(seen))) accuse_images(t_ns);
+  if (seen.frozen || crossed(seen)) accuse_images(t_ns);
 }
 
 /// Wheels and beams have something to say on the ground only.
