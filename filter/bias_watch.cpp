@@ -6,7 +6,7 @@ namespace ear {
 namespace {
 
 constexpr double kMemory = 0.5;  // [s]
-constexpr double kSigmas = 6.0;  // of the sum of the corrections: these do not happen by chance
+constexpr double kSigmas = 5.0;  // of the sum of the corrections: these do not happen by chance
 
 }  // namespace
 
