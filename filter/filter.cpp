@@ -16,7 +16,6 @@ constexpr double kRollingWindow = 2.0;       // [s] of samples kept for a start 
 constexpr double kLongestPredict = 0.5;      // [s] beyond the newest sample
 constexpr double kWheelAge = 0.1;            // [s] older readings do not tell whether the wheels rest
 constexpr double kHeldSample = 0.04;         // [s] so far the newest IMU sample may stand in for one that is missing
-constexpr double kFeigned = 3.0;             // standard deviations of the cameras' mounting that feign a turn
 constexpr double kLifting = 0.3;             // [s] after wheels that leave the ground, or meet it, as it seems
 constexpr std::size_t kMaxCompared = 512;    // features of a frame whose motion is compared with other sensors
 
@@ -223,6 +222,7 @@ std::optional<Estimate> Filter::process(const FeatureFrame& given) {
     last_image_ns_ = frame.t_ns;
     last_features_ = frame;
     image_T_WB_ = {state_.imu.R_WB, state_.imu.p_WB};
+    image_rate_B_ = rate_B_;
   }
   return finish_frame(true, agreement);
 }
@@ -239,8 +239,6 @@ std::optional<Estimate> Filter::finish_frame(bool image, const FrameAgreement& a
   std::optional<Estimate> estimate;
   if (frame.running) {
     estimate = make_estimate();
-    const auto mounting = covariance_.matrix().diagonal().segment<3>(err::camera).cwiseMax(0.0);
-    frame.feigned_turn = kFeigned * rate_B_.norm() * std::sqrt(mounting.maxCoeff());
     frame.possible = possible();
   }
   if (frame.possible && estimate) {

@@ -191,6 +191,7 @@ class Filter {
   [[nodiscard]] Pose motion_since_image() const;
   void bridge(const FeatureFrame& frame);
   [[nodiscard]] double noise_of(const FeatureFrame& frame);
+  [[nodiscard]] double feigned_turn(double dt) const;
   [[nodiscard]] FrameAgreement check_frame(const FeatureFrame& frame);
   void go_on_blind(bool still);
   void use_image(const FeatureFrame& frame, bool still);
@@ -242,9 +243,10 @@ class Filter {
   std::uint64_t next_frame_ = 0;
   TimeNs last_frame_ns_ = 0;  ///< camera stamp of the last frame processed
   bool any_frame_ = false;
-  Pose image_T_WB_;             ///< body at the last image
-  TimeNs last_image_ns_ = 0;    ///< its camera stamp
-  FeatureFrame last_features_;  ///< its features
+  Pose image_T_WB_;                                         ///< body at the last image
+  Eigen::Vector3d image_rate_B_ = Eigen::Vector3d::Zero();  ///< its rate then [rad/s]
+  TimeNs last_image_ns_ = 0;                                ///< its camera stamp
+  FeatureFrame last_features_;                              ///< its features
   bool any_image_ = false;
   bool noiseless_camera_ = false;   ///< its images repeat while nothing moves: that means nothing
   bool clone_is_here_ = false;      ///< the newest clone was made where the vehicle is, if it stands

@@ -13,6 +13,7 @@ namespace {
 constexpr double kBridgeRotation = 2e-3;     // [rad] standard deviations with which two images tell of the motion:
 constexpr double kBridgePosition = 5e-3;     // [m] well above what the features will tell later
 constexpr std::size_t kFewestRepeated = 8;   // features, for two images to be the same
+constexpr double kFeigned = 3.0;             // standard deviations of the cameras' calibration that feign a turn
 constexpr double kOldImage = 0.5;            // [s] after which frames have little in common
 constexpr double kCommonShare = 0.5;         // of its features, that the elder of a copy must have seen
 constexpr double kNoisy = 1.25;              // times the usual standard deviation of a feature: less may be chance
@@ -80,6 +81,15 @@ double Filter::noise_of(const FeatureFrame& frame) {
   return ratio > kNoisy ? ratio : 1.0;
 }
 
+/// How fast the errors of the cameras' mounting and of their time offset make the vehicle seem to turn otherwise than
+/// the gyroscope says, with the last image `dt` ago [rad/s].
+double Filter::feigned_turn(double dt) const {
+  const double mounting = covariance_.matrix().diagonal().segment<3>(err::camera).cwiseMax(0.0).maxCoeff();
+  const double offset = std::max(0.0, covariance_.matrix()(err::time_offset, err::time_offset));
+  const double acceleration = (rate_B_ - image_rate_B_).norm() / dt;
+  return kFeigned * std::sqrt(rate_B_.squaredNorm() * mounting + acceleration * acceleration * offset);
+}
+
 /// At the state's time, which is the frame's, before the frame changes it: does it show the motion since the last image
 /// that the other sensors predict?
 FrameAgreement Filter::check_frame(const FeatureFrame& frame) {
@@ -91,6 +101,7 @@ FrameAgreement Filter::check_frame(const FeatureFrame& frame) {
     const double sigma_v = std::sqrt(covariance_.matrix().diagonal().segment<3>(err::nu).maxCoeff());
     const PredictedMotion motion{moved.R, moved.p, dt * sigma_v};
     agreement = frame_check_.compare(last_features_, frame, motion, state_.camera, feature_noise_);
+    agreement.feigned_turn = feigned_turn(dt);
   }
   agreement.noise = feature_noise_;
   agreement.behind = frame_check_.share_behind(frame, state_.camera, feature_noise_);

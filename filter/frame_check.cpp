@@ -9,8 +9,9 @@
 namespace ear {
 namespace {
 
-constexpr std::size_t kFewest = 8;    // features in common, for anything to be said
-constexpr double kLeastDepth = 1e-3;  // of a scaled point: smaller is beside or behind the camera
+constexpr std::size_t kFewest = 8;        // features in common, for anything to be said
+constexpr double kLeastVariance = 1e-10;  // [m^2] of the way
+constexpr double kLeastDepth = 1e-3;      // of a scaled point: smaller is beside or behind the camera
 
 double share(int part, int of) { return of > 0 ? static_cast<double>(part) / of : 0.0; }
 
@@ -41,30 +42,34 @@ FrameAgreement FrameCheck::compare(const FeatureFrame& from, const FeatureFrame&
   const double baseline = cameras.T_C0C1.p.norm();
   const double way = motion.p_B0B1.norm();
   int off_left = 0, off_right = 0, seen_right = 0;
-  Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
-  Eigen::Vector3d b = Eigen::Vector3d::Zero();
+  // Of a turn and a way beyond the predicted ones, least squares; the way is known to sigma_p.
+  Eigen::Matrix<double, 6, 6> A = Eigen::Matrix<double, 6, 6>::Zero();
+  Eigen::Matrix<double, 6, 1> b = Eigen::Matrix<double, 6, 1>::Zero();
   for (const StereoMatch& match : matches_) {
     const double s = stereo_inverse_depth(cameras, match.left0, match.right0);
     // Noise of this observation and of the one that it starts from; of the depth, whose error the way makes visible;
     // of the way itself.
     const double sigma_s = std::sqrt(2.0) * sigma / baseline;
-    const double variance = 2.0 * sigma * sigma + std::pow(way * sigma_s, 2) + std::pow(s * motion.sigma_p, 2);
+    const double noise_variance = 2.0 * sigma * sigma + std::pow(way * sigma_s, 2);
+    const double variance = noise_variance + std::pow(s * motion.sigma_p, 2);
     const Eigen::Vector3d g = T_BC0.R * match.left0.homogeneous() + s * T_BC0.p;
     const Eigen::Vector3d moved = motion.R_B0B1.transpose() * (g - s * motion.p_B0B1);
-    const auto residual = [&](const Pose& T_BC, const Eigen::Vector2d& uv, Eigen::Matrix<double, 2, 3>& J_turn) {
+    const auto residual = [&](const Pose& T_BC, const Eigen::Vector2d& uv, Eigen::Matrix<double, 2, 6>& J) {
       const Eigen::Vector3d h = T_BC.R.transpose() * (moved - s * T_BC.p);
       if (h.z() < kLeastDepth) return Eigen::Vector2d::Constant(1.0).eval();
       const Eigen::Vector2d predicted = h.hnormalized();
       Eigen::Matrix<double, 2, 3> J_h;
       J_h << 1.0, 0.0, -predicted.x(), 0.0, 1.0, -predicted.y();
-      J_turn = J_h / h.z() * T_BC.R.transpose() * skew(moved);
+      const Eigen::Matrix<double, 2, 3> J_moved = J_h / h.z() * T_BC.R.transpose();
+      J.leftCols<3>() = J_moved * skew(moved);
+      J.rightCols<3>() = -s * J_moved * motion.R_B0B1.transpose();
       return (uv - predicted).eval();
     };
-    Eigen::Matrix<double, 2, 3> J = Eigen::Matrix<double, 2, 3>::Zero();
+    Eigen::Matrix<double, 2, 6> J = Eigen::Matrix<double, 2, 6>::Zero();
     const Eigen::Vector2d left = residual(T_BC0, match.left1, J);
     if (left.squaredNorm() <= gate_ * variance) {
-      A += J.transpose() * J / variance;
-      b += J.transpose() * left / variance;
+      A += J.transpose() * J / noise_variance;
+      b += J.transpose() * left / noise_variance;
     } else {
       ++off_left;
     }
@@ -74,9 +79,13 @@ FrameAgreement FrameCheck::compare(const FeatureFrame& from, const FeatureFrame&
   }
   result.left = share(off_left, result.matches);
   result.right = share(off_right, seen_right);
-  const double least = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(A).eigenvalues()(0);
+  A.diagonal().tail<3>().array() += 1.0 / std::max(motion.sigma_p * motion.sigma_p, kLeastVariance);
+  const Eigen::LLT<Eigen::Matrix3d> way_llt(A.bottomRightCorner<3, 3>());
+  const Eigen::Matrix3d gain = way_llt.solve(A.bottomLeftCorner<3, 3>()).transpose();
+  const Eigen::Matrix3d of_turn = A.topLeftCorner<3, 3>() - gain * A.bottomLeftCorner<3, 3>();
+  const double least = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(of_turn).eigenvalues()(0);
   if (least > 1.0) {
-    result.turn = A.ldlt().solve(b);
+    result.turn = of_turn.ldlt().solve(b.head<3>() - gain * b.tail<3>());
     result.turn_sigma = 1.0 / std::sqrt(least);
   }
   return result;

@@ -19,9 +19,10 @@ struct PredictedMotion {
 };
 
 struct FrameAgreement {
-  int matches = 0;      ///< features seen by both cameras in the first frame, by the left one in the second
-  double left = 0.0;    ///< share of them that are not where they were expected: left camera
-  double right = 0.0;   ///< right camera
+  int matches = 0;            ///< features seen by both cameras in the first frame, by the left one in the second
+  double left = 0.0;          ///< share of them that are not where they were expected: left camera
+  double right = 0.0;         ///< right camera
+  double feigned_turn = 0.0;  ///< [rad/s] so fast the cameras' calibration may make it seem to turn; the filter's
   // What the image tells by itself, whatever came before.
   double noise = 1.0;   ///< of the features, times the usual
   double behind = 0.0;  ///< share of the stereo features that the geometry puts behind the cameras

@@ -16,7 +16,7 @@ constexpr double kFewStereo = 0.25;  // of the features: less are seen by the ri
 constexpr int kFewTracks = 10;
 constexpr double kSparse = 0.4;         // of the usual number of features: less are seen
 constexpr double kTracksMemory = 20.0;  // [s]
-constexpr double kSilent = 0.12;  // [s] without a frame, and kMissedFrames of its intervals
+constexpr double kSilent = 0.12;        // [s] without a frame, and kMissedFrames of its intervals
 constexpr double kMissedFrames = 2.5;
 constexpr double kStale = 0.5;          // [s] after which what the last frame said holds no more
 constexpr double kTick = 0.03;          // [s] between two looks at silent sensors
@@ -280,7 +280,7 @@ void HealthMonitor::judge_turn(const Frame& frame) {
   const double scatter_share = 1.0 - std::exp(-frame_interval_ / kScatterMemory);
   turn_scatter_ += scatter_share * (off * off - turn_scatter_);
   turn_rate_ += share * (rate - turn_rate_);
-  feigned_turn_ += share * (frame.feigned_turn - feigned_turn_);
+  feigned_turn_ += share * (seen.feigned_turn - feigned_turn_);
   const double by_chance = kTurnSigmas * std::sqrt(0.5 * share * turn_scatter_);
   turns_otherwise_ = known && turn_rate_.norm() > std::max(kTurnOff, by_chance) + feigned_turn_;
 }

@@ -86,7 +86,6 @@ class HealthMonitor {
     FrameAgreement agreement;
     FrameStatistics statistics;
     double speed = 0.0;             ///< [m/s]
-    double feigned_turn = 0.0;      ///< [rad/s] that errors of the cameras' mounting may make of the vehicle's turning
     double velocity_sigma = 0.0;    ///< [m/s] worst axis, seen from the vehicle
     double horizontal_sigma = 0.0;  ///< [m]
     double vertical_sigma = 0.0;    ///< [m]
