@@ -9,9 +9,10 @@
 namespace ear {
 namespace {
 
-constexpr std::size_t kFewest = 8;        // features in common, for anything to be said
-constexpr double kLeastVariance = 1e-10;  // [m^2] of the way
-constexpr double kLeastDepth = 1e-3;      // of a scaled point: smaller is beside or behind the camera
+constexpr std::size_t kFewest = 8;    // features in common, for anything to be said
+constexpr double kLooser = 4.0;       // a wrong way must not look like a turn: it may be wrong by more than it should
+constexpr double kLeastWay = 1e-5;    // [m]
+constexpr double kLeastDepth = 1e-3;  // of a scaled point: smaller is beside or behind the camera
 
 double share(int part, int of) { return of > 0 ? static_cast<double>(part) / of : 0.0; }
 
@@ -42,7 +43,7 @@ FrameAgreement FrameCheck::compare(const FeatureFrame& from, const FeatureFrame&
   const double baseline = cameras.T_C0C1.p.norm();
   const double way = motion.p_B0B1.norm();
   int off_left = 0, off_right = 0, seen_right = 0;
-  // Of a turn and a way beyond the predicted ones, least squares; the way is known to sigma_p.
+  // Of a turn and a way beyond the predicted ones, least squares; the way is known to some sigma_p.
   Eigen::Matrix<double, 6, 6> A = Eigen::Matrix<double, 6, 6>::Zero();
   Eigen::Matrix<double, 6, 1> b = Eigen::Matrix<double, 6, 1>::Zero();
   for (const StereoMatch& match : matches_) {
@@ -79,7 +80,8 @@ FrameAgreement FrameCheck::compare(const FeatureFrame& from, const FeatureFrame&
   }
   result.left = share(off_left, result.matches);
   result.right = share(off_right, seen_right);
-  A.diagonal().tail<3>().array() += 1.0 / std::max(motion.sigma_p * motion.sigma_p, kLeastVariance);
+  const double sigma_way = std::max(kLooser * motion.sigma_p, kLeastWay);
+  A.diagonal().tail<3>().array() += 1.0 / (sigma_way * sigma_way);
   const Eigen::LLT<Eigen::Matrix3d> way_llt(A.bottomRightCorner<3, 3>());
   const Eigen::Matrix3d gain = way_llt.solve(A.bottomLeftCorner<3, 3>()).transpose();
   const Eigen::Matrix3d of_turn = A.topLeftCorner<3, 3>() - gain * A.bottomLeftCorner<3, 3>();
