@@ -11,8 +11,9 @@ class BiasWatch {
  public:
   using Vector6 = Eigen::Matrix<double, 6, 1>;  ///< gyroscope [rad/s], accelerometer [m/s^2]
 
-  /// One update: what it added to the biases, and by how much it lowered their variances.
-  void add(const Vector6& correction, const Vector6& variance_lowered);
+  /// One update: what it added to the biases, and by how much it lowered their variances. Those by images are believed
+  /// sooner: wheels that leave the ground unnoticed mislead.
+  void add(const Vector6& correction, const Vector6& variance_lowered, bool by_image);
 
   struct Verdict {
     bool gyro = false;
@@ -24,8 +25,11 @@ class BiasWatch {
   void clear();
 
  private:
-  Vector6 sum_ = Vector6::Zero();
-  Vector6 variance_ = Vector6::Zero();
+  struct Sum {
+    Vector6 correction = Vector6::Zero();
+    Vector6 variance = Vector6::Zero();
+  };
+  Sum all_, images_;
 };
 
 }  // namespace ear

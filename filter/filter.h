@@ -169,7 +169,8 @@ class Filter {
   void advance(TimeNs t_ns);
   void advance_measuring(TimeNs t_ns);
   [[nodiscard]] Motion motion_at(TimeNs t_ns) const;
-  void update(const Eigen::Ref<const Eigen::MatrixXd>& H, int first_column, const Eigen::Ref<const Eigen::VectorXd>& r);
+  void update(const Eigen::Ref<const Eigen::MatrixXd>& H, int first_column, const Eigen::Ref<const Eigen::VectorXd>& r,
+              bool by_image = false);
 
   // filter_ground.cpp
   [[nodiscard]] Displacement displacement_by_wheels(TimeNs until_ns) const;

@@ -71,7 +71,7 @@ void Filter::bridge(const FeatureFrame& frame) {
   Eigen::Matrix<double, 6, 1> r;
   r << rows.residual.head<3>() / kBridgeRotation, llt.matrixL().solve(rows.residual.tail<3>());
   learn_calibration_ = false;
-  update(H, 0, r);
+  update(H, 0, r, true);
 }
 
 /// By how much the features are less exact than they usually are: 1 if they are not.
@@ -196,7 +196,7 @@ void Filter::update_with_features(const FeatureFrame& frame, std::optional<std::
   }
   log_features();
   information_.compress();
-  if (information_.residual().size() > 0) update(information_.H(), err::camera, information_.residual());
+  if (information_.residual().size() > 0) update(information_.H(), err::camera, information_.residual(), true);
 
   // Features that ended, used or not, are forgotten.
   tracks_.keep_if([&](const Track& track) {

@@ -136,13 +136,13 @@ Filter::Motion Filter::motion_at(TimeNs t_ns) const {
 }
 
 void Filter::update(const Eigen::Ref<const Eigen::MatrixXd>& H, int first_column,
-                    const Eigen::Ref<const Eigen::VectorXd>& r) {
+                    const Eigen::Ref<const Eigen::VectorXd>& r, bool by_image) {
   const int considered = learn_calibration_ ? 0 : err::calibration_size;
   const auto variance = [this] { return covariance_.matrix().diagonal().segment<6>(err::b_g); };
   const BiasWatch::Vector6 before = variance();
   const Eigen::Ref<const Eigen::VectorXd> correction = covariance_.update(H, first_column, r, err::camera, considered);
   if (!correction.allFinite()) return;  // the covariance shows it: possible()
-  bias_watch_.add(correction.segment<6>(err::b_g), before - variance());
+  bias_watch_.add(correction.segment<6>(err::b_g), before - variance(), by_image);
   boxplus_in_place(state_, correction);
 }
 

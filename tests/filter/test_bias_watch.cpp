@@ -28,7 +28,7 @@ class Tracker {
       bias_(i) += correction(i);
       variance_(i) -= lowered(i);
     }
-    watch_.add(correction, lowered);
+    watch_.add(correction, lowered, true);
     return watch_.judge(kDt);
   }
 
@@ -79,7 +79,7 @@ TEST_CASE("bias_watch: what was said is not said again") {
   BiasWatch watch;
   Vector6 correction = Vector6::Zero();
   correction(0) = 1.0;
-  watch.add(correction, Vector6::Constant(1e-4));
+  watch.add(correction, Vector6::Constant(1e-4), false);
   CHECK(watch.judge(kDt).gyro);
   CHECK_FALSE(watch.judge(kDt).gyro);
 }
