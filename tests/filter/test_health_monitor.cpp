@@ -238,13 +238,37 @@ TEST_CASE("health: images that cannot be true are not to be used") {
   }
 }
 
+TEST_CASE("health: images in doubt are named, and in flight carry the estimate all the same") {
+  Drive drive;
+  drive.frame.statistics.on_ground = false;
+  drive.frame.statistics.wheel_rows_used = 0;
+  drive.go_on(3.0);
+  CHECK(drive.health().status == HealthStatus::tracking);
+  const HealthMonitor::Frame sound = drive.frame;
+  SUBCASE("a third of the usual features") { drive.frame.statistics.tracks = drive.frame.statistics.stereo = 33; }
+  SUBCASE("somebody crosses the view") { drive.frame.agreement.left = drive.frame.agreement.right = 0.2; }
+  SUBCASE("twice the usual noise") { drive.frame.agreement.noise = 2.0; }
+  SUBCASE("they come late, and fit") { drive.stamp_error = -200'000'000; }
+  drive.go_on(0.45);
+  CHECK(drive.health().status == HealthStatus::degraded);
+  CHECK(drive.health().untrusted[index_of(Source::camera_left)]);
+  CHECK(drive.health().untrusted[index_of(Source::camera_right)]);
+  drive.go_on(4.0);
+  CHECK(drive.health().status == HealthStatus::degraded);
+  CHECK(drive.health().aiding == Aiding::cameras);
+  drive.frame = sound;
+  drive.stamp_error = 0;
+  drive.go_on(0.7);
+  CHECK(drive.health().status == HealthStatus::tracking);
+}
+
 TEST_CASE("health: cameras that turn otherwise accuse the gyroscope, but not by what their mounting feigns") {
   for (const double feigned : {0.0, 0.05}) {
     CAPTURE(feigned);
     Drive drive;
     drive.frame.agreement.matches = 100;
     drive.frame.agreement.turn_sigma = 1e-4;
-    drive.frame.feigned_turn = feigned;
+    drive.frame.agreement.feigned_turn = feigned;
     drive.go_on(5.0);
     drive.frame.agreement.turn = Eigen::Vector3d(0.0, 0.0, 0.03 * 0.05);  // 0.03 rad/s
     drive.go_on(1.0);
