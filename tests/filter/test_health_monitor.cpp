@@ -242,7 +242,7 @@ TEST_CASE("health: images in doubt are named, and in flight carry the estimate a
   Drive drive;
   drive.frame.statistics.on_ground = false;
   drive.frame.statistics.wheel_rows_used = 0;
-  drive.go_on(3.0);
+  drive.go_on(20.0);  // what is usual is known by then
   CHECK(drive.health().status == HealthStatus::tracking);
   const HealthMonitor::Frame sound = drive.frame;
   SUBCASE("a third of the usual features") { drive.frame.statistics.tracks = drive.frame.statistics.stereo = 33; }
