@@ -221,8 +221,9 @@ class Filter {
   ImuBuffer imu_;
   InputGuard guard_;
   ImpactGuard impact_guard_;
-  std::optional<ImuHole> imu_hole_;  ///< ahead of the state, or around it
-  bool imu_doubtful_ = false;        ///< samples since the last image may be wrong by more than noise
+  std::optional<ImuHole> imu_hole_;   ///< ahead of the state, or around it
+  bool imu_doubtful_ = false;         ///< samples since the last image may be wrong by more than noise
+  std::optional<TimeNs> bridged_ns_;  ///< when images last did
   BiasWatch bias_watch_;
   TimeNs watched_ns_ = 0;                             ///< when it last judged
   Eigen::Vector3d rate_B_ = Eigen::Vector3d::Zero();  ///< mean rate of the last piece integrated, bias removed [rad/s]

@@ -72,6 +72,7 @@ void Filter::bridge(const FeatureFrame& frame) {
   r << rows.residual.head<3>() / kBridgeRotation, llt.matrixL().solve(rows.residual.tail<3>());
   learn_calibration_ = false;
   update(H, 0, r, true);
+  bridged_ns_ = state_.imu.t_ns;
 }
 
 /// By how much the features are less exact than they usually are: 1 if they are not.

@@ -12,6 +12,7 @@ constexpr double kSpikeRatio = 4.0;       // and so many times the difference of
 constexpr double kGapNoiseFactor = 10.0;  // on the noise densities while a gap in the IMU data is bridged
 constexpr double kHoleAccel = 1.0;        // [m/s^2] while nothing was measured
 constexpr double kDoubtfulTurn = 5e-3;    // [rad] standard deviation of what one inertial sample adds
+constexpr double kSettles = 0.07;         // [s] after a bridge
 constexpr double kImageSoon = 0.25;       // [s] after the last one
 constexpr double kBiasDelay = 0.3;        // [s] until a bias that jumped is found out
 
@@ -85,7 +86,8 @@ void Filter::leave_imu_hole() {
 /// With an attitude that may be some degrees off, wheels and lasers would be linearized in the wrong place: the next
 /// image comes first, if there is one soon.
 bool Filter::waits_for_bridge() const {
-  return imu_doubtful_ && any_image_ && calibration_.cameras.size() == 2 &&
+  const bool just_bridged = bridged_ns_ && seconds_between(*bridged_ns_, state_.imu.t_ns) < kSettles;
+  return (imu_doubtful_ || just_bridged) && any_image_ && calibration_.cameras.size() == 2 &&
          seconds_between(imu_time(last_image_ns_), state_.imu.t_ns) < kImageSoon;
 }
 
