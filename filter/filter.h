@@ -185,7 +185,7 @@ class Filter {
   void add_to_displacement(TimeNs until_ns);
   void update_with_displacement();
   void update_with_beams(const BeamRanges& reading);
-  void restart_ground(const BeamRanges& reading, const Eigen::Matrix3d& R_WB);
+  bool restart_ground(const BeamRanges& reading, const Eigen::Matrix3d& R_WB);
 
   // filter_images.cpp
   [[nodiscard]] bool repeats_last_image(const FeatureFrame& frame) const;
@@ -232,6 +232,8 @@ class Filter {
   Ring<BeamRanges> ranges_;                          ///< the same
   std::optional<WheelTurn> passed_turn_;             ///< the last one that was
   bool ground_known_ = false;                        ///< the lasers saw the ground since it was last touched
+  int misplaced_grounds_ = 0;                        ///< readings in a row whose plane the wheels do not stand on
+  int leaning_readings_ = 0;                         ///< readings in a row with an axle that does not lie along it
   std::optional<WheelPreintegration> displacement_;  ///< since the newest clone
   Ring<WheelTurn> displacement_turns_;               ///< not yet used up by it
   TimeNs displacement_ns_ = 0;                       ///< up to where it goes

@@ -17,6 +17,9 @@ constexpr double kTakeoffVelocity = 0.05;      // [m/s] what the odometer was wr
 constexpr double kTakeoffPosition = 5e-3;      // [m] what came of it
 constexpr double kDoubtTime = 0.5;             // [s] the contradiction of two wheels is one error so long
 constexpr double kSlipEnds = 0.15;             // [s] of agreement before a row that failed its gate is used again
+constexpr double kLevelOff = 0.05;             // [m] of a plane from the wheels that stand on it
+constexpr double kLeanOff = 0.2;               // sine of the axle's angle to it
+constexpr int kPatience = 25;                  // readings of the lasers
 constexpr TimeNs kMissedReading = 50'000'000;  // [ns] without wheel readings: a displacement has a hole
 
 }  // namespace
@@ -238,7 +241,7 @@ void Filter::update_with_beams(const BeamRanges& reading) {
   if (config_.odometer.model != OdometerModel::terrain || !on_ground()) return;
   const LaserCalibration& lasers = *calibration_.lasers;
   const Motion motion = motion_at(reading.t_ns);
-  if (!ground_known_) restart_ground(reading, motion.R_WB);
+  if (!ground_known_ && !restart_ground(reading, motion.R_WB)) return;
   const double sigma = std::hypot(lasers.noise, config_.odometer.unevenness);
   Eigen::Matrix<double, kMaxBeams + 1, kGroundColumns> H;
   Eigen::Matrix<double, kMaxBeams + 1, 1> r;
@@ -271,19 +274,31 @@ void Filter::update_with_beams(const BeamRanges& reading) {
   if (axle.lean * axle.lean <= gate_(1) * (covariance_.variance(h, err::nu) + axle_sigma * axle_sigma)) {
     h /= axle_sigma;
     r(count++) = -axle.lean / axle_sigma;
+    leaning_readings_ = 0;
+  } else if (++leaning_readings_ > kPatience) {  // the axle stands on it: it is the plane that is wrong
+    ground_known_ = false;
+    leaning_readings_ = 0;
+    return;
   }
   if (count > 0) update(H.topRows(count), err::nu, r.head(count));
 }
 
-/// Where nothing is known of the ground, the plane through the hits is where the linearization starts.
-void Filter::restart_ground(const BeamRanges& reading, const Eigen::Matrix3d& R_WB) {
+/// Where nothing is known of the ground, the plane through the hits is where the linearization starts. The wheels stand
+/// on it: a plane that is elsewhere is none, one of the beams hit something else. False: with this reading nothing can
+/// be begun. If it does not get better, the ground is taken for level, and the gates have to find out.
+bool Filter::restart_ground(const BeamRanges& reading, const Eigen::Matrix3d& R_WB) {
+  const OdometerState& o = state_.odometer;
   const Eigen::Vector3d range(reading.range[0], reading.range[1], reading.range[2]);
-  const std::optional<GroundPlane> plane =
-      plane_through_hits(calibration_.lasers->beams, range, state_.odometer.T_BO.p);
-  if (!plane) return;
-  state_.ground.n_W = (R_WB * plane->n_B).normalized();
+  const std::optional<GroundPlane> plane = plane_through_hits(calibration_.lasers->beams, range, o.T_BO.p);
+  if (!plane) return true;
+  const bool carries = std::abs(plane->height - o.wheel_radius.mean()) < kLevelOff &&
+                       std::abs(plane->n_B.dot(o.T_BO.R.col(1))) < kLeanOff;
+  if (!carries && ++misplaced_grounds_ < kPatience) return false;
+  misplaced_grounds_ = 0;
+  state_.ground.n_W = carries ? Eigen::Vector3d((R_WB * plane->n_B).normalized()) : Eigen::Vector3d::UnitZ();
   covariance_.restart(err::normal, Eigen::Vector2d::Constant(config_.odometer.normal_prior));
   ground_known_ = true;
+  return true;
 }
 
 }  // namespace ear
