@@ -114,8 +114,9 @@ class Filter {
   /// Where no inertial samples are, though time passed: a gap, or a clock that jumped.
   struct ImuHole {
     TimeNs from_ns = 0;
-    TimeNs to_ns = 0;     ///< at once, if the clock jumped back
-    double unseen = 0.0;  ///< [s] that passed
+    TimeNs to_ns = 0;      ///< at once, if the clock jumped back
+    double unseen = 0.0;   ///< [s] that passed
+    double doubted = 0.0;  ///< share of it that the covariance knows of
   };
 
   struct Clocks {
@@ -161,7 +162,8 @@ class Filter {
 
   // filter_motion.cpp
   void mend_spike(const ImuSample& next);
-  void leave_imu_hole();
+  void doubt_imu_hole();
+  void doubt_imu();
   void doubt_motion(double rotation, double velocity, double position);
   void watch_biases(double dt);
   [[nodiscard]] bool waits_for_bridge() const;
@@ -221,9 +223,9 @@ class Filter {
   ImuBuffer imu_;
   InputGuard guard_;
   ImpactGuard impact_guard_;
-  std::optional<ImuHole> imu_hole_;   ///< ahead of the state, or around it
-  bool imu_doubtful_ = false;         ///< samples since the last image may be wrong by more than noise
-  std::optional<TimeNs> bridged_ns_;  ///< when images last did
+  std::optional<ImuHole> imu_hole_;          ///< ahead of the state, or around it
+  std::optional<TimeNs> doubtful_since_ns_;  ///< inertial samples since the last image may be wrong by more than noise
+  std::optional<TimeNs> bridged_ns_;         ///< when images last did
   BiasWatch bias_watch_;
   TimeNs watched_ns_ = 0;                             ///< when it last judged
   Eigen::Vector3d rate_B_ = Eigen::Vector3d::Zero();  ///< mean rate of the last piece integrated, bias removed [rad/s]

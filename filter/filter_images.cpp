@@ -45,8 +45,8 @@ Pose Filter::motion_since_image() const {
 /// jumped), the two images tell how the body moved, roughly: later, the features of both will tell it in full, around a
 /// state that is near enough to be linear. docs/filter.md, section 15.
 void Filter::bridge(const FeatureFrame& frame) {
-  const bool needed = imu_doubtful_;
-  imu_doubtful_ = false;
+  const bool needed = doubtful_since_ns_.has_value();
+  doubtful_since_ns_.reset();
   if (!needed || !any_image_ || calibration_.cameras.size() < 2 || state_.clones.empty()) return;
   match_stereo(last_features_, frame, bridge_matches_);
   const Pose moved = motion_since_image();

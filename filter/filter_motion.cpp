@@ -11,9 +11,10 @@ constexpr double kGyroSpike = 2.0;        // [rad/s] the same
 constexpr double kSpikeRatio = 4.0;       // and so many times the difference of these
 constexpr double kGapNoiseFactor = 10.0;  // on the noise densities while a gap in the IMU data is bridged
 constexpr double kHoleAccel = 1.0;        // [m/s^2] while nothing was measured
+constexpr double kHoleRate = 0.3;         // [rad/s] the same
 constexpr double kDoubtfulTurn = 5e-3;    // [rad] standard deviation of what one inertial sample adds
 constexpr double kSettles = 0.07;         // [s] after a bridge
-constexpr double kImageSoon = 0.25;       // [s] after the last one
+constexpr double kImageSoon = 0.25;       // [s] so long readings wait for one
 constexpr double kBiasDelay = 0.3;        // [s] until a bias that jumped is found out
 
 }  // namespace
@@ -58,7 +59,7 @@ void Filter::advance(TimeNs t_ns) {
         ImuCalibration noise = calibration_.imu;
         noise.gyro_noise *= factors.gyro;
         noise.accel_noise *= factors.accel / trust(MotionSensor::imu);
-        imu_doubtful_ = imu_doubtful_ || noise.gyro_noise * std::sqrt(dt) > kDoubtfulTurn;
+        if (noise.gyro_noise * std::sqrt(dt) > kDoubtfulTurn) doubt_imu();
         if (imu_hole_ && state_.imu.t_ns >= imu_hole_->from_ns) {
           noise.gyro_noise *= kGapNoiseFactor;
           noise.accel_noise *= kGapNoiseFactor;
@@ -71,24 +72,37 @@ void Filter::advance(TimeNs t_ns) {
   const double walk = config_.odometer.normal_walk;
   const double distance = encoder_ ? state_.imu.v_W.norm() * duration : 0.0;
   covariance_.propagate(total, tangent_basis(state_.ground.n_W), walk * walk * distance);
-  leave_imu_hole();
+  doubt_imu_hole();
 }
 
-/// Where samples are missing, they may be lost, or the clock jumped: the vehicle went on meanwhile, or it did not.
-void Filter::leave_imu_hole() {
-  if (!imu_hole_ || state_.imu.t_ns < imu_hole_->to_ns) return;
-  const double unseen = imu_hole_->unseen;
-  imu_hole_.reset();
-  imu_doubtful_ = true;
-  doubt_motion(unseen * rate_B_.norm(), kHoleAccel * unseen, unseen * state_.imu.v_W.norm());
+/// Where samples are missing, they may be lost, or the clock jumped: the vehicle went on meanwhile, or it did not. What
+/// it did, it did all the time: the standard deviations grow with the time.
+void Filter::doubt_imu_hole() {
+  if (!imu_hole_ || state_.imu.t_ns <= imu_hole_->from_ns) return;
+  ImuHole& hole = *imu_hole_;
+  const bool over = state_.imu.t_ns >= hole.to_ns;
+  const double share =
+      over ? 1.0 : seconds_between(hole.from_ns, state_.imu.t_ns) / seconds_between(hole.from_ns, hole.to_ns);
+  const double T = hole.unseen * std::sqrt(share * share - hole.doubted * hole.doubted);
+  hole.doubted = share;
+  if (over) imu_hole_.reset();
+  doubt_imu();
+  doubt_motion(T * std::hypot(rate_B_.norm(), kHoleRate), kHoleAccel * T, T * state_.imu.v_W.norm());
+}
+
+/// Samples since the last image may be wrong by more than noise.
+void Filter::doubt_imu() {
+  if (!doubtful_since_ns_) doubtful_since_ns_ = state_.imu.t_ns;
 }
 
 /// With an attitude that may be some degrees off, wheels and lasers would be linearized in the wrong place: the next
 /// image comes first, if there is one soon.
 bool Filter::waits_for_bridge() const {
-  const bool just_bridged = bridged_ns_ && seconds_between(*bridged_ns_, state_.imu.t_ns) < kSettles;
-  return (imu_doubtful_ || just_bridged) && any_image_ && calibration_.cameras.size() == 2 &&
-         seconds_between(imu_time(last_image_ns_), state_.imu.t_ns) < kImageSoon;
+  if (!any_image_ || calibration_.cameras.size() < 2) return false;
+  const auto since = [this](TimeNs t_ns) { return seconds_between(t_ns, state_.imu.t_ns); };
+  return (imu_hole_ && since(imu_hole_->from_ns) > 0.0) ||
+         (doubtful_since_ns_ && since(*doubtful_since_ns_) < kImageSoon) ||
+         (bridged_ns_ && since(*bridged_ns_) < kSettles);
 }
 
 /// Propagates to t_ns, taking in wheels and lasers on the way: each at its own time, or, if the state has passed that

@@ -68,7 +68,8 @@ void Filter::stop() {
   displacement_turns_.clear();
   bias_watch_.clear();
   imu_hole_.reset();
-  imu_doubtful_ = false;
+  doubtful_since_ns_.reset();
+  bridged_ns_.reset();
   agrees_since_ns_.fill(0);
   ground_known_ = false;
   clone_is_here_ = false;

@@ -1,6 +1,7 @@
 // Jumps and holes of the inertial sensors, the images and the clocks, for five seconds, on feature tracks.
 #include <doctest/doctest.h>
 
+#include <cstdint>
 #include <string>
 
 #include "tools/experiments/figures.h"
@@ -19,12 +20,13 @@ struct Outcome {
 
 constexpr double kFault = 20.0;  // [s]
 
-Outcome run(const std::string& sequence, const std::string& fault) {
+Outcome run(const std::string& sequence, const std::string& fault, std::uint64_t seed = 831) {
   simulator::Options options;
   options.sequence = sequence;
-  options.seed = 831;
+  options.seed = seed;
   options.duration = 35.0;
-  if (!fault.empty()) options.faults = {simulator::parse_fault(fault + "@20+5")};
+  const bool placed = fault.find('@') != std::string::npos;
+  if (!fault.empty()) options.faults = {simulator::parse_fault(placed ? fault : fault + "@20+5")};
   const simulator::Simulation simulation(options);
   Outcome outcome;
   TimeNs last_ns = 0;
@@ -75,6 +77,29 @@ TEST_CASE("jumps: in flight a clock that leaps, and images that come late, cost 
     const Outcome outcome = run("fly1", fault);
     CHECK(outcome.ate < 1.5 * clean);
     CHECK(outcome.named);
+    CHECK(outcome.lost == 0.0);
+  }
+}
+
+TEST_CASE("jumps: half a second without inertial samples, with a frame just before they return") {
+  const double clean = run("flat1", "", 931).ate;
+  const Outcome outcome = run("flat1", "imu_gap@20+0.5", 931);  // the frame at 20.508 s, the samples at 20.518 s
+  CHECK(outcome.ate < 2.0 * clean);
+  CHECK(outcome.named);
+  CHECK(outcome.lost == 0.0);
+}
+
+TEST_CASE("jumps: clipped jolts, four a second, with and without wheels on the ground") {
+  CHECK(run("flat1", "imu_saturated", 924).ate < 2.0 * run("flat1", "", 924).ate);
+  CHECK(run("wave1", "imu_saturated", 931).ate < 3.0 * run("wave1", "", 931).ate);
+}
+
+TEST_CASE("jumps: a beam that is wrong from the start does not tell where the ground is") {
+  const double clean = run("flat1", "").ate;
+  for (const std::string fault : {"laser_biased.front_left@0+5=-0.05", "laser_biased.front_left@0+5=0.3"}) {
+    CAPTURE(fault);
+    const Outcome outcome = run("flat1", fault);
+    CHECK(outcome.ate < 2.0 * clean);
     CHECK(outcome.lost == 0.0);
   }
 }
