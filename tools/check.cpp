@@ -10,6 +10,7 @@
 
 #include "src/recording/recording_check.h"
 #include "tools/commands.h"
+#include "tools/opened_recording.h"
 
 namespace ear::tools {
 namespace {
@@ -19,6 +20,7 @@ constexpr int kUnusable = 2;
 struct CheckArguments {
   std::filesystem::path recording;
   std::vector<std::filesystem::path> calibration_files;
+  std::filesystem::path config;
   bool json = false;
 };
 
@@ -104,7 +106,8 @@ void print(const RecordingReport& report) {
 }
 
 void check(const CheckArguments& arguments) {
-  const RecordingReport report = check_recording(arguments.recording, arguments.calibration_files);
+  const OpenedRecording opened(arguments.recording, arguments.config);
+  const RecordingReport report = check_recording(opened.folder(), arguments.calibration_files);
   if (arguments.json) {
     std::cout << to_json(report).dump(2) << '\n';
   } else {
@@ -119,9 +122,11 @@ void add_check_command(CLI::App& app) {
   const auto arguments = std::make_shared<CheckArguments>();
   CLI::App* const command =
       app.add_subcommand("check", "Say whether a recording can be used, and what is odd about it");
-  command->add_option("recording", arguments->recording, "Folder of the recording")->required();
+  command->add_option("recording", arguments->recording, "Folder of the recording, or a ROS 1 bag")->required();
   command->add_option("--calibration", arguments->calibration_files,
                       "Kalibr's camchain-imucam.yaml or imu.yaml, instead of the recording's own; may be given twice");
+  command->add_option("--config", arguments->config, "Settings, of which a bag's topics count (docs/bags.md)")
+      ->check(CLI::ExistingFile);
   command->add_flag("--json", arguments->json, "Print JSON");
   command->footer("Exit code: 0 usable (perhaps with warnings), 2 unusable.");
   command->callback([arguments] { check(*arguments); });

@@ -10,6 +10,7 @@ void add_simulate_command(CLI::App& app);
 void add_evaluate_command(CLI::App& app);
 void add_check_command(CLI::App& app);
 void add_bench_command(CLI::App& app);
+void add_export_command(CLI::App& app);
 void add_experiments_command(CLI::App& app);
 
 }  // namespace ear::tools

@@ -85,7 +85,7 @@ void run_experiments(ExperimentsArguments args) {
   for (int i = 0; i < seeds; ++i) conditions.seeds.push_back(args.first_seed + static_cast<std::uint64_t>(i));
 
   const std::vector<paper::TableDefinition> definitions =
-      args.ablation ? paper::ablation_tables(sequences) : paper::paper_tables(sequences);
+      args.ablation ? paper::ablation_tables(sequences, conditions.tracks) : paper::paper_tables(sequences);
   const std::vector<paper::Setup> setups = paper::setups_of(definitions);
   const std::size_t made = paper::measure(conditions, setups);
 

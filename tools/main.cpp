@@ -29,6 +29,7 @@ int run_subcommand(int argc, char** argv) {
   ear::tools::add_evaluate_command(app);
   ear::tools::add_check_command(app);
   ear::tools::add_bench_command(app);
+  ear::tools::add_export_command(app);
   ear::tools::add_experiments_command(app);
   try {
     app.parse(argc, argv);

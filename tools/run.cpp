@@ -18,6 +18,7 @@
 #include "src/recording/writers.h"
 #include "tools/commands.h"
 #include "tools/flight_controller.h"
+#include "tools/opened_recording.h"
 #include "tools/progress.h"
 #include "tools/replay.h"
 
@@ -170,7 +171,8 @@ void run(const RunArguments& args) {
   options.calibration_files = args.calibration;
   options.camera_rate_hz = args.camera_rate_hz;
   options.mono = args.mono;
-  Recording recording(args.recording, options);
+  const OpenedRecording opened(args.recording, args.config);
+  Recording recording(opened.folder(), options);
   Odometry odometry(config, recording.calibration());
 
   std::filesystem::create_directories(args.out);
@@ -224,7 +226,10 @@ void run(const RunArguments& args) {
 void add_run_command(CLI::App& app) {
   auto* command = app.add_subcommand("run", "Estimate the trajectory of a recording");
   auto args = std::make_shared<RunArguments>();
-  command->add_option("RECORDING", args->recording, "Folder in the EuRoC/ASL layout (docs/recordings.md)")->required();
+  command
+      ->add_option("RECORDING", args->recording,
+                   "Folder in the EuRoC/ASL layout (docs/recordings.md), or a ROS 1 bag (docs/bags.md)")
+      ->required();
   command->add_option("--out", args->out, "Folder for estimate.tum, states.csv, summary.json, config.yaml")
       ->capture_default_str();
   command->add_option("--config", args->config, "Settings; what it leaves out keeps its default")

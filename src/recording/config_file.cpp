@@ -28,8 +28,7 @@ E load_choice(const YamlMap& map, const char* key) {
 }
 
 template <typename T>
-void load(const YamlMap& map, T& settings) {
-  std::vector<std::string> known;
+void load(const YamlMap& map, T& settings, std::vector<std::string> known = {}) {
   visit(settings, [&](const char* key, auto& field) {
     known.emplace_back(key);
     if (!map.has(key)) return;
@@ -66,7 +65,7 @@ void save(const T& settings, YAML::Emitter& out) {
 
 Config load_config(const std::filesystem::path& file) {
   Config config;
-  load(YamlMap::load(file), config);
+  load(YamlMap::load(file), config, {"topics"});  // of a bag: load_topics()
   return config;
 }
 

@@ -17,6 +17,7 @@ LAYERS = {
     "frontend/": ["frontend/", "include/ear/", "eigen", "opencv", *STANDARD],
     "src/": ["src/", "filter/", "frontend/", "include/ear/", "eigen", "opencv", "spdlog", *STANDARD],
     "src/recording/": ["src/recording/", "include/ear/", "eigen", "opencv", "yaml-cpp", "json", "spdlog", *STANDARD],
+    "src/bag/": ["src/bag/", "src/recording/", "include/ear/", "eigen", "ros", "yaml-cpp", *STANDARD],
     "src/mavlink/": ["src/mavlink/", "filter/", "include/ear/", "eigen", "posix", *STANDARD],
     # Simulated truth shares no code with the models, and an evaluation does not know what made the estimate.
     "tools/simulator/": ["tools/simulator/", "include/ear/", "eigen", "opencv", *STANDARD],
@@ -34,7 +35,8 @@ HOSTED = ["atomic", "chrono", "condition_variable", "cstdio", "ctime", "filesyst
           "mutex", "shared_mutex", "thread"]
 
 LIBRARIES = {"Eigen": "eigen", "unsupported": "eigen", "opencv2": "opencv", "yaml-cpp": "yaml-cpp", "spdlog": "spdlog",
-             "nlohmann": "json", "CLI": "cli11", "doctest": "doctest", "sys": "posix", "ceres": "ceres", "glog": "ceres"}
+             "nlohmann": "json", "CLI": "cli11", "doctest": "doctest", "sys": "posix", "ceres": "ceres", "glog": "ceres",
+             "rosbag": "ros", "sensor_msgs": "ros", "geometry_msgs": "ros"}
 
 INCLUDE = re.compile(r'^\s*#\s*include\s*["<]([^">]+)[">]')
 

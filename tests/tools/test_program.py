@@ -27,7 +27,7 @@ class CommandLine(unittest.TestCase):
 
     def test_help(self):
         self.assertEqual(ear("--help").returncode, 0)
-        for subcommand in ("run", "simulate", "evaluate", "check", "bench", "experiments"):
+        for subcommand in ("run", "simulate", "evaluate", "check", "bench", "export", "experiments"):
             self.assertIn(subcommand, ear("--help").stdout)
             self.assertEqual(ear(subcommand, "--help").returncode, 0)
 

@@ -14,7 +14,13 @@ void replay(const simulator::Simulation& simulation, Filter& filter, const OnEst
     if (result) on_estimate(stamp_ns, *result);
   };
   for (const simulator::Delivery& delivery : simulation.deliveries()) {
-    hand_over(simulation, delivery, filter);
+    if (delivery.stream == simulator::SensorStream::encoder && options.change_encoder) {
+      filter.add_encoder(options.change_encoder(simulation.encoders()[delivery.index]));
+    } else if (delivery.stream == simulator::SensorStream::laser && options.change_laser) {
+      filter.add_laser(options.change_laser(simulation.lasers()[delivery.index]));
+    } else {
+      hand_over(simulation, delivery, filter);
+    }
     if (delivery.stream == simulator::SensorStream::camera && options.camera) {
       FeatureFrame frame = simulation.tracks(delivery.index);
       if (const std::optional<TimeNs> stamp_ns = filter.common_stamp(frame.t_ns)) {

@@ -11,6 +11,10 @@ namespace ear::experiments {
 /// May alter a frame's features before the filter gets them.
 using ChangeFrame = std::function<void(FeatureFrame&)>;
 
+/// Gives the sample that the filter gets in the place of a simulated one.
+using ChangeEncoder = std::function<EncoderSample(const EncoderSample&)>;
+using ChangeLaser = std::function<LaserSample(const LaserSample&)>;
+
 /// Is given every estimate, and the time that it was asked for: a frame's stamp, or the stamp that a frame would have.
 using OnEstimate = std::function<void(TimeNs stamp_ns, const Estimate& estimate)>;
 
@@ -19,6 +23,8 @@ using OnDelivery = std::function<void(const simulator::Delivery& delivery)>;
 
 struct ReplayOptions {
   ChangeFrame change = {};
+  ChangeEncoder change_encoder = {};
+  ChangeLaser change_laser = {};
   OnDelivery after = {};
   bool camera = true;  ///< false: no frame is handed over
   bool wheels = true;  ///< false: no steps while frames are missing (tools/blind_steps.h)

@@ -259,7 +259,7 @@ std::vector<TableDefinition> paper_tables(const Texts& sequences) {
   return tables;
 }
 
-std::vector<TableDefinition> ablation_tables(const Texts& sequences) {
+std::vector<TableDefinition> ablation_tables(const Texts& sequences, bool tracks) {
   TableDefinition summary{"ablation",
                           "What each ingredient gives: RMSE of the position over that of the default",
                           "Geometric mean over the sequences of the ratio of medians: 1.10 is an error 10 % larger.",
@@ -277,6 +277,7 @@ std::vector<TableDefinition> ablation_tables(const Texts& sequences) {
                       {}});
   }
   for (const std::string& name : ablation()) {
+    if (!tracks && find_configuration(name).tracks_only) continue;
     const std::string title = find_configuration(name).title;
     Row means{title, {}, {}};
     for (std::size_t i = 0; i < kAblationRates.size(); ++i) {

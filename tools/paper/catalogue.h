@@ -62,8 +62,9 @@ struct TableDefinition {
 /// Tables I to V and "all", for those of `sequences` only.
 [[nodiscard]] std::vector<TableDefinition> paper_tables(const std::vector<std::string>& sequences);
 
-/// One table of each ingredient left out, by camera rate, and one per rate with all sequences.
-[[nodiscard]] std::vector<TableDefinition> ablation_tables(const std::vector<std::string>& sequences);
+/// One table of each ingredient left out, by camera rate, and one per rate with all sequences. Some
+/// ingredients can be measured on feature tracks only.
+[[nodiscard]] std::vector<TableDefinition> ablation_tables(const std::vector<std::string>& sequences, bool tracks);
 
 /// All setups that the tables need, each once.
 [[nodiscard]] std::vector<Setup> setups_of(const std::vector<TableDefinition>& tables);

@@ -47,6 +47,14 @@ std::vector<Configuration> left_out() {
            [](Config& c) { c.filter.odometer.update = OdometerUpdate::displacement; }),
       with("oldest-clone", "oldest clone makes room", [](Config& c) { c.filter.keyframe_parallax_px = 0.0; }),
   };
+  Configuration no_pitch_rate = with("no-pitch-rate", "no pitch-rate correction", [](Config&) {});
+  no_pitch_rate.pitch_rate = false;
+  no_pitch_rate.tracks_only = true;
+  list.push_back(no_pitch_rate);
+  Configuration together = with("beams-together", "beams only together", [](Config&) {});
+  together.beams_together = true;
+  together.tracks_only = true;
+  list.push_back(together);
   Configuration no_lasers = with("no-lasers", "no lasers, no slope", [](Config&) {});
   no_lasers.lasers = false;
   list.push_back(no_lasers);
@@ -92,9 +100,10 @@ const std::vector<Configuration>& configurations() {
 }
 
 const std::vector<std::string>& ablation() {
-  static const std::vector<std::string> names{"default",      "no-lasers",           "no-side-slip",
-                                              "weights-off",  "weights-mahalanobis", "weights-distance",
-                                              "displacement", "oldest-clone",        "none"};
+  static const std::vector<std::string> names{
+      "default",          "none",         "no-pitch-rate", "no-lasers",
+      "beams-together",   "no-side-slip", "weights-off",   "weights-mahalanobis",
+      "weights-distance", "displacement", "oldest-clone"};
   return names;
 }
 
@@ -108,6 +117,8 @@ const Configuration& find_configuration(const std::string& name) {
 std::string settings_text(const Configuration& configuration) {
   std::string text = configuration.estimator == Estimator::filter ? "" : "estimator: smoother\n";
   if (!configuration.lasers) text += "lasers: not told\n";
+  if (!configuration.pitch_rate) text += "pitch rate: taken out of the encoders\n";
+  if (configuration.beams_together) text += "beams: together\n";
   append_fields(text, "", configuration.config);
   return text;
 }

@@ -20,7 +20,10 @@ struct Configuration {
   std::string title;  ///< for people
   Config config;
   Estimator estimator = Estimator::filter;
-  bool lasers = true;  ///< false: the estimator is not told that there are any
+  bool lasers = true;      ///< false: the estimator is not told that there are any
+  bool pitch_rate = true;  ///< false: the encoders' angles come without the body's pitch, so that (5) gives nothing
+  bool beams_together = false;  ///< true: a reading of the lasers in which one has no return is left out
+  bool tracks_only = false;     ///< it changes samples, which only a simulation in memory allows
 };
 
 /// All that can be asked for by name: the default settings, the odometer models, the anomaly weights on and off, the

@@ -12,6 +12,7 @@
 #include "tools/evaluation/read.h"
 #include "tools/experiments/replay_simulation.h"
 #include "tools/experiments/simulation_truth.h"
+#include "tools/paper/measure/changed_samples.h"
 #include "tools/replay.h"
 
 namespace ear::paper {
@@ -104,6 +105,8 @@ Result run_on_tracks(const simulator::Simulation& simulation, const Configuratio
   Record record;
   experiments::ReplayOptions options;
   options.wheels = calibration.encoder && config.odometer.model != OdometerModel::none;
+  if (!configuration.pitch_rate) options.change_encoder = WithoutPitch(simulation, calibration);
+  if (configuration.beams_together) options.change_laser = together;
   double begin = 0.0;
   options.change = [&](FeatureFrame&) { begin = thread_time(); };  // the last thing before the filter has the frame
   options.after = [&](const simulator::Delivery& delivery) {
