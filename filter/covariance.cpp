@@ -55,7 +55,7 @@ void Covariance::widen(int first, const Eigen::Ref<const Eigen::MatrixXd>& Q) {
   P_.block(first, first, Q.rows(), Q.cols()) += Q;
 }
 
-double Covariance::variance(const Eigen::Ref<const Eigen::RowVectorXd>& h, int first_column) const {
+double Covariance::variance_of_row(const Eigen::Ref<const Eigen::RowVectorXd>& h, int first_column) const {
   const auto n = h.size();
   double sum = 0.0;
   for (Eigen::Index j = 0; j < n; ++j) {

@@ -31,7 +31,11 @@ class Covariance {
   void widen(int first, const Eigen::Ref<const Eigen::MatrixXd>& Q);
 
   /// Variance of the row h of the entries from `first_column` on.
-  [[nodiscard]] double variance(const Eigen::Ref<const Eigen::RowVectorXd>& h, int first_column) const;
+  template <typename Row>
+  [[nodiscard]] double variance(const Eigen::MatrixBase<Row>& h, int first_column) const {
+    const typename Row::PlainObject row = h;  // next to each other; those of a matrix's row are not
+    return variance_of_row(row, first_column);
+  }
 
   /// Appends J * error, J: 6 x size. Only the columns of the inertial part and of the time offset are used: a clone is
   /// taken where the vehicle is now.
@@ -50,6 +54,8 @@ class Covariance {
                                            int considered_count = 0);
 
  private:
+  [[nodiscard]] double variance_of_row(const Eigen::Ref<const Eigen::RowVectorXd>& h, int first_column) const;
+
   Eigen::MatrixXd P_;
   int size_ = 0;
   Eigen::MatrixXd PHt_, S_, considered_, scratch_;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "filter/capacity.h"
 #include "filter/displacements.h"
 #include "filter/ground.h"
 #include "filter/initial_state.h"
@@ -18,6 +19,8 @@ constexpr double kWheelAge = 0.1;            // [s] older readings do not tell w
 constexpr double kHeldSample = 0.04;         // [s] so far the newest IMU sample may stand in for one that is missing
 constexpr double kLifting = 0.3;             // [s] after wheels that leave the ground, or meet it, as it seems
 constexpr std::size_t kMaxCompared = 512;    // features of a frame whose motion is compared with other sensors
+
+constexpr int kClonePairRows = 9;  // that a measurement between the state and one clone has
 
 int error_capacity(const FilterConfig& config) { return err::clone(config.window + 1); }
 
@@ -44,17 +47,32 @@ Filter::Filter(const FilterConfig& config, const Calibration& calibration)
       displacement_turns_(kWheelCapacity),
       contact_(config.contact, calibration),
       standstill_(config.standstill, focal_px_),
+      tracks_(2 * kFeatureCapacity, static_cast<std::size_t>(config.window) + 1),
       consistency_check_(config.anomaly),
       camera_displacement_(config.feature_sigma_px / focal_px_, kMaxCompared),
       frame_check_(config.feature_sigma_px / focal_px_, gate_(2)),
       monitor_(calibration, calibration.encoder && config.odometer.model != OdometerModel::none,
                config.odometer.model == OdometerModel::terrain),
       moving_start_({config.prior.gyro_bias, config.prior.accel_bias, config.feature_sigma_px / focal_px_}),
+      rows_(kClonePairRows, error_capacity(config)),
       information_(config.window + 1, config.max_track_updates) {
   state_.camera = camera_state(calibration);
   state_.odometer = odometer_state(calibration);
   if (calibration.encoder && config.odometer.model != OdometerModel::none) encoder_.emplace(*calibration.encoder);
-  state_.clones.reserve(static_cast<std::size_t>(config.window) + 1);
+  take_memory();
+}
+
+/// All that process() and the samples will need.
+void Filter::take_memory() {
+  const auto clones = static_cast<std::size_t>(config_.window) + 1;
+  state_.clones.reserve(clones);
+  last_features_.features.reserve(kFeatureCapacity);
+  cameras_.reserve(2 * clones);
+  sightings_.reserve(2 * clones);
+  observations_.reserve(2 * clones);
+  selected_.reserve(2 * kFeatureCapacity);
+  frame_ids_.reserve(kFeatureCapacity);
+  parallax_.reserve(2 * kFeatureCapacity);
 }
 
 TimeNs Filter::imu_time(TimeNs camera_time_ns) const {

@@ -127,6 +127,7 @@ class Filter {
   static constexpr TimeNs kDisagrees = -1;
 
   // filter.cpp
+  void take_memory();
   void hear(ImuClock::Stream stream, TimeNs t_ns);
   void take_waiting_imu();
   [[nodiscard]] std::optional<TimeNs> now() const;
@@ -271,10 +272,12 @@ class Filter {
   Anchor anchor_;                      ///< of the state's world in that of the estimates
   std::optional<Estimate> last_good_;  ///< the last estimate that rested on more than inertia
   SourceLog log_;                      ///< what each sensor measured, against what was expected
-  std::vector<StereoMatch> bridge_matches_;
+  StereoMatches bridge_matches_;
   std::array<double, 2> camera_squares_{};    ///< of this frame's features: residuals of either camera [px^2]
   std::array<int, 2> camera_observations_{};  ///< how many of them, one for each axis
 
+  // Memory that is used again.
+  Eigen::MatrixXd rows_;  ///< of measurements between the state and one clone
   FeatureInformation information_;
   std::vector<CameraPose> cameras_;
   std::vector<Sighting> sightings_;

@@ -217,16 +217,19 @@ void Filter::update_with_displacement() {
   const int newest = static_cast<int>(state_.clones.size()) - 1;
   const DisplacementRows rows = linearize_displacement(state_, newest, z);
   const int clone = err::clone(newest);
-  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(3, clone + err::clone_size);
+  auto H = rows_.topRows<3>().leftCols(clone + err::clone_size);
+  H.setZero();
   H.leftCols<err::camera>() = rows.H;
   H.rightCols<err::clone_size>() = rows.H_clone;
   const double floor = config_.odometer.speed_sigma * z.duration;
   const Eigen::Matrix3d R = rows.covariance + floor * floor * Eigen::Matrix3d::Identity();
   const Eigen::LLT<Eigen::Matrix3d> llt(R);
-  H = llt.matrixL().solve(H).eval();
-  const Eigen::Vector3d r = llt.matrixL().solve(rows.residual);
+  llt.matrixL().solveInPlace(H);
+  Eigen::Vector3d r = llt.matrixL().solve(rows.residual);
   const auto P = covariance_.matrix().topLeftCorner(H.cols(), H.cols());
-  const Eigen::Matrix3d S = H * P * H.transpose() + Eigen::Matrix3d::Identity();
+  auto HP = rows_.middleRows<3>(3).leftCols(H.cols());
+  HP.noalias() = H * P;
+  const Eigen::Matrix3d S = HP * H.transpose() + Eigen::Matrix3d::Identity();
   const bool passes = r.dot(S.ldlt().solve(r)) <= gate_(3);
   if (!agrees_again(agrees_since_ns_[WheelRows::speed], passes, state_.imu.t_ns)) {
     statistics_.wheel_rows_rejected += 3;
@@ -234,7 +237,9 @@ void Filter::update_with_displacement() {
   }
   statistics_.wheel_rows_used += 3;
   const double weight = trust(MotionSensor::odometer);
-  update(weight * H, 0, weight * r);
+  H *= weight;
+  r *= weight;
+  update(H, 0, r);
 }
 
 void Filter::update_with_beams(const BeamRanges& reading) {
@@ -296,7 +301,8 @@ bool Filter::restart_ground(const BeamRanges& reading, const Eigen::Matrix3d& R_
   if (!carries && ++misplaced_grounds_ < kPatience) return false;
   misplaced_grounds_ = 0;
   state_.ground.n_W = carries ? Eigen::Vector3d((R_WB * plane->n_B).normalized()) : Eigen::Vector3d::UnitZ();
-  covariance_.restart(err::normal, Eigen::Vector2d::Constant(config_.odometer.normal_prior));
+  const Eigen::Vector2d sigma = Eigen::Vector2d::Constant(config_.odometer.normal_prior);
+  covariance_.restart(err::normal, sigma);
   ground_known_ = true;
   return true;
 }

@@ -48,13 +48,12 @@ void Filter::bridge(const FeatureFrame& frame) {
   const bool needed = doubtful_since_ns_.has_value();
   doubtful_since_ns_.reset();
   if (!needed || !any_image_ || calibration_.cameras.size() < 2 || state_.clones.empty()) return;
-  match_stereo(last_features_, frame, bridge_matches_);
   const Pose moved = motion_since_image();
   StereoMotion start;
   start.R_B0B1 = moved.R;
   start.p_B0B1 = moved.p;
-  const std::optional<StereoMotion> motion =
-      stereo_motion(bridge_matches_, state_.camera, start, config_.feature_sigma_px / focal_px_);
+  const std::optional<StereoMotion> motion = stereo_motion(bridge_matches_.find(last_features_, frame), state_.camera,
+                                                           start, config_.feature_sigma_px / focal_px_);
   if (!motion) return;
   const int newest = static_cast<int>(state_.clones.size()) - 1;
   const RelativeMotionRows rows = linearize_relative_motion(state_, newest, {motion->R_B0B1, motion->p_B0B1});
@@ -63,7 +62,8 @@ void Filter::bridge(const FeatureFrame& frame) {
       R_WB0 * motion->covariance * R_WB0.transpose() + kBridgePosition * kBridgePosition * Eigen::Matrix3d::Identity();
   const Eigen::LLT<Eigen::Matrix3d> llt(covariance);
   const int clone = err::clone(newest);
-  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(6, clone + err::clone_size);
+  auto H = rows_.topLeftCorner(6, clone + err::clone_size);
+  H.setZero();
   H.topLeftCorner<3, err::imu_size>() = rows.H.topRows<3>() / kBridgeRotation;
   H.topRightCorner<3, err::clone_size>() = rows.H_clone.topRows<3>() / kBridgeRotation;
   H.bottomLeftCorner<3, err::imu_size>() = llt.matrixL().solve(rows.H.bottomRows<3>());
@@ -150,7 +150,8 @@ void Filter::hold_still() {
   Eigen::Matrix<double, 6, 1> weight;
   weight << Eigen::Vector3d::Constant(1.0 / still.rotation_sigma),
       Eigen::Vector3d::Constant(1.0 / still.position_sigma);
-  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(9, columns);
+  auto H = rows_.topLeftCorner(9, columns);
+  H.setZero();
   Eigen::Matrix<double, 9, 1> r;
   H.topLeftCorner<6, err::imu_size>() = weight.asDiagonal() * rows.H;
   H.topRightCorner<6, err::clone_size>() = weight.asDiagonal() * rows.H_clone;
@@ -232,9 +233,11 @@ void Filter::select_tracks(const FeatureFrame& frame, std::optional<std::uint64_
     if (ended || fills_window) selected_.push_back(i);
   }
   const auto longer = [&](std::size_t a, std::size_t b) {
-    return tracks_[a].observations.size() > tracks_[b].observations.size();
+    const std::size_t observations_a = tracks_[a].observations.size();
+    const std::size_t observations_b = tracks_[b].observations.size();
+    return observations_a != observations_b ? observations_a > observations_b : a < b;
   };
-  std::stable_sort(selected_.begin(), selected_.end(), longer);
+  std::sort(selected_.begin(), selected_.end(), longer);
   const auto limit = static_cast<std::size_t>(config_.max_track_updates);
   if (selected_.size() > limit) selected_.resize(limit);
 }

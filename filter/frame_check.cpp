@@ -3,6 +3,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "filter/so3.h"
 
@@ -34,9 +35,9 @@ FrameAgreement FrameCheck::compare(const FeatureFrame& from, const FeatureFrame&
                                    const CameraState& cameras, double noise) {
   FrameAgreement result;
   const double sigma = noise * sigma_;
-  match_stereo(from, to, matches_);
-  result.matches = static_cast<int>(matches_.size());
-  if (matches_.size() < kFewest) return result;
+  const std::vector<StereoMatch>& matches = matches_.find(from, to);
+  result.matches = static_cast<int>(matches.size());
+  if (matches.size() < kFewest) return result;
 
   const Pose& T_BC0 = cameras.T_BC0;
   const Pose T_BC1 = {T_BC0.R * cameras.T_C0C1.R, T_BC0.R * cameras.T_C0C1.p + T_BC0.p};
@@ -46,7 +47,7 @@ FrameAgreement FrameCheck::compare(const FeatureFrame& from, const FeatureFrame&
   // Of a turn and a way beyond the predicted ones, least squares; the way is known to some sigma_p.
   Eigen::Matrix<double, 6, 6> A = Eigen::Matrix<double, 6, 6>::Zero();
   Eigen::Matrix<double, 6, 1> b = Eigen::Matrix<double, 6, 1>::Zero();
-  for (const StereoMatch& match : matches_) {
+  for (const StereoMatch& match : matches) {
     const double s = stereo_inverse_depth(cameras, match.left0, match.right0);
     // Noise of this observation and of the one that it starts from; of the depth, whose error the way makes visible;
     // of the way itself.

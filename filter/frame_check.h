@@ -3,7 +3,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <vector>
 
 #include "ear/types.h"
 #include "filter/state.h"
@@ -45,7 +44,7 @@ class FrameCheck {
 
  private:
   double sigma_, gate_;
-  std::vector<StereoMatch> matches_;
+  StereoMatches matches_;
 };
 
 }  // namespace ear

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "filter/capacity.h"
 #include "filter/so3.h"
 
 namespace ear {
@@ -19,6 +20,8 @@ double median(std::vector<double>& values) {
 }
 
 }  // namespace
+
+ImageNoise::ImageNoise() { distances_.reserve(kFeatureCapacity); }
 
 double ImageNoise::measure(const FeatureFrame& frame, const CameraState& cameras) {
   const Eigen::Matrix3d R_C1C0 = cameras.T_C0C1.R.transpose();

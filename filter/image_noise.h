@@ -11,6 +11,8 @@ namespace ear {
 
 class ImageNoise {
  public:
+  ImageNoise();
+
   /// Standard deviation of one observation, one axis, by the distances from the epipolar lines [normalized]; what is
   /// common to all of them is an error of the calibration, and left out. 0 with fewer than 20 stereo features.
   [[nodiscard]] double measure(const FeatureFrame& frame, const CameraState& cameras);

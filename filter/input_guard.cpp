@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "filter/capacity.h"
+
 namespace ear {
 namespace {
 
@@ -21,7 +23,10 @@ constexpr double kLostAfter = 2.0;   // [s] without inertial samples: where the 
 }  // namespace
 
 InputGuard::InputGuard(const Calibration& calibration, double max_imu_gap)
-    : max_imu_gap_(max_imu_gap), beam_count_(calibration.lasers ? calibration.lasers->beams.size() : 0) {}
+    : max_imu_gap_(max_imu_gap), beam_count_(calibration.lasers ? calibration.lasers->beams.size() : 0) {
+  ids_.reserve(kFeatureCapacity);
+  sound_frame_.features.reserve(kFeatureCapacity);
+}
 
 ImuVerdict InputGuard::judge(const ImuSample& sample) {
   StreamCounts& counts = counts_.imu;

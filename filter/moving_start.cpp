@@ -65,13 +65,13 @@ void MovingStart::add(TimeNs t_ns, const FeatureFrame& frame, const ImuBuffer& i
   TimedFrame next{t_ns, frame, StereoMotion{}};
   if (!first) {
     const TimedFrame& last = frames_.back();
-    match_stereo(last.features, frame, matches_);
+    const std::vector<StereoMatch>& matches = matches_.find(last.features, frame);
     StereoMotion start;
     start.R_B0B1 = rotation_between(imu, last.t_ns, t_ns);
     const double dt = seconds_between(last.t_ns, t_ns);
     start.p_B0B1 = way_to(t_ns).value_or(Eigen::Vector3d::Zero());
-    const std::optional<StereoMotion> motion = stereo_motion(matches_, cameras, start, noise_.feature);
-    if (motion && dt < kLongestStep && !frozen(matches_)) {
+    const std::optional<StereoMotion> motion = stereo_motion(matches, cameras, start, noise_.feature);
+    if (motion && dt < kLongestStep && !frozen(matches)) {
       next.motion = *motion;
     } else {
       frames_.clear();

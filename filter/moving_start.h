@@ -51,7 +51,7 @@ class MovingStart {
 
   MovingStartNoise noise_;
   std::vector<TimedFrame> frames_;  ///< oldest first
-  std::vector<StereoMatch> matches_;
+  StereoMatches matches_;
 };
 
 }  // namespace ear

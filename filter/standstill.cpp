@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "filter/capacity.h"
+
 namespace ear {
 namespace {
 constexpr std::size_t kMinCommonFeatures = 8;  // fewer do not tell motion from mismatches
@@ -23,6 +25,13 @@ void WheelRest::add(const WheelTurn& turn) {
 std::optional<double> WheelRest::duration(TimeNs t_ns, double max_age) const {
   if (!any_ || seconds_between(newest_ns_, t_ns) > max_age) return std::nullopt;
   return seconds_between(since_ns_, newest_ns_);
+}
+
+StandstillDetector::StandstillDetector(const StandstillConfig& config, double focal_px)
+    : config_(config), focal_px_(focal_px) {
+  reference_.reserve(kFeatureCapacity);
+  renewed_.reserve(kFeatureCapacity);
+  for (auto& component : flow_) component.reserve(kFeatureCapacity);
 }
 
 bool StandstillDetector::update(const FeatureFrame& frame, const ImuStatistics& imu, const Eigen::Vector3d& gyro_bias,

@@ -31,7 +31,7 @@ class WheelRest {
 class StandstillDetector {
  public:
   /// `focal_px`: pixels per unit of normalized image coordinates.
-  StandstillDetector(const StandstillConfig& config, double focal_px) : config_(config), focal_px_(focal_px) {}
+  StandstillDetector(const StandstillConfig& config, double focal_px);
 
   /// Looks at one frame. `imu`: the samples of the last config.duration seconds. `gyro_bias` [rad/s]; `max_gyro`
   /// [rad/s]: how far the mean rate may be from it. `wheel_rest`: for how long the wheels have not turned [s], nothing

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 
+#include "filter/capacity.h"
 #include "filter/so3.h"
 
 namespace ear {
@@ -38,13 +39,11 @@ struct NormalEquations {
 class Problem {
  public:
   Problem(const std::vector<StereoMatch>& matches, const CameraState& cameras, double sigma)
-      : matches_(matches), sigma_(sigma) {
+      : matches_(matches), state_(cameras), sigma_(sigma) {
     const Pose& T_BC0 = cameras.T_BC0;
     cameras_[0] = T_BC0;
     cameras_[1] = {T_BC0.R * cameras.T_C0C1.R, T_BC0.R * cameras.T_C0C1.p + T_BC0.p};
     baseline_ = cameras.T_C0C1.p.norm();
-    points_.reserve(matches.size());
-    for (const StereoMatch& match : matches) points_.push_back(point_of(match, cameras));
   }
 
   /// One step from `x`. `fitting`: how many features fit.
@@ -54,10 +53,11 @@ class Problem {
     // A depth's error moves the point in frame 1 by its parallax, which is in proportion to the way.
     const double share = std::sqrt(2.0) * x.p_B0B1.norm() / baseline_;
     const double sigma = sigma_ * std::sqrt(1.0 + share * share);
-    for (std::size_t i = 0; i < matches_.size(); ++i) {
-      if (points_[i].s < 0.0) continue;  // behind the cameras
-      bool fits = add(x, points_[i], cameras_[0], matches_[i].left1, sigma, sums);
-      if (matches_[i].has_right1) fits = add(x, points_[i], cameras_[1], matches_[i].right1, sigma, sums) && fits;
+    for (const StereoMatch& match : matches_) {
+      const ScaledPoint point = point_of(match, state_);  // anew in each step: cheaper than memory for all of them
+      if (point.s < 0.0) continue;                        // behind the cameras
+      bool fits = add(x, point, cameras_[0], match.left1, sigma, sums);
+      if (match.has_right1) fits = add(x, point, cameras_[1], match.right1, sigma, sums) && fits;
       fitting += fits ? 1 : 0;
     }
     return sums;
@@ -86,27 +86,33 @@ class Problem {
   }
 
   const std::vector<StereoMatch>& matches_;
+  const CameraState& state_;
   double sigma_;
   double baseline_;
-  std::array<Pose, 2> cameras_;
-  std::vector<ScaledPoint> points_;
+  std::array<Pose, 2> cameras_;  // in B
 };
 
 }  // namespace
 
-void match_stereo(const FeatureFrame& from, const FeatureFrame& to, std::vector<StereoMatch>& matches) {
-  matches.clear();
-  std::vector<const FeatureObservation*> earlier;
+StereoMatches::StereoMatches() {
+  earlier_.reserve(kFeatureCapacity);
+  matches_.reserve(kFeatureCapacity);
+}
+
+const std::vector<StereoMatch>& StereoMatches::find(const FeatureFrame& from, const FeatureFrame& to) {
+  earlier_.clear();
+  matches_.clear();
   for (const FeatureObservation& feature : from.features) {
-    if (feature.has_right) earlier.push_back(&feature);
+    if (feature.has_right) earlier_.push_back(&feature);
   }
   const auto by_id = [](const FeatureObservation* a, const FeatureObservation* b) { return a->id < b->id; };
-  std::sort(earlier.begin(), earlier.end(), by_id);
+  std::sort(earlier_.begin(), earlier_.end(), by_id);
   for (const FeatureObservation& now : to.features) {
-    const auto found = std::lower_bound(earlier.begin(), earlier.end(), &now, by_id);
-    if (found == earlier.end() || (*found)->id != now.id) continue;
-    matches.push_back({(*found)->left, (*found)->right, now.left, now.right, now.has_right});
+    const auto found = std::lower_bound(earlier_.begin(), earlier_.end(), &now, by_id);
+    if (found == earlier_.end() || (*found)->id != now.id) continue;
+    matches_.push_back({(*found)->left, (*found)->right, now.left, now.right, now.has_right});
   }
+  return matches_;
 }
 
 double stereo_inverse_depth(const CameraState& cameras, const Eigen::Vector2d& left, const Eigen::Vector2d& right) {

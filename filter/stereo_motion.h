@@ -18,8 +18,18 @@ struct StereoMatch {
   bool has_right1 = false;
 };
 
-/// Features with an observation in both cameras of `from`, and in the left one of `to`.
-void match_stereo(const FeatureFrame& from, const FeatureFrame& to, std::vector<StereoMatch>& matches);
+/// Finds the features with an observation in both cameras of one frame, and in the left one of another.
+class StereoMatches {
+ public:
+  StereoMatches();
+
+  /// The features of both frames; valid until the next call.
+  const std::vector<StereoMatch>& find(const FeatureFrame& from, const FeatureFrame& to);
+
+ private:
+  std::vector<const FeatureObservation*> earlier_;  ///< those of `from`, by id
+  std::vector<StereoMatch> matches_;
+};
 
 /// Depth along the ray of the left camera: least squares over the right one, linear. Inverse [1/m]; negative where the
 /// images contradict the cameras' geometry.

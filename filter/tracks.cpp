@@ -4,6 +4,10 @@
 
 namespace ear {
 
+TrackTable::TrackTable(std::size_t tracks, std::size_t observations) : tracks_(tracks) {
+  for (Track& track : tracks_) track.observations.reserve(observations);
+}
+
 void TrackTable::add(std::uint64_t frame, const std::vector<FeatureObservation>& features) {
   const std::size_t known = size_;
   for (const FeatureObservation& feature : features) {

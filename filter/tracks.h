@@ -25,6 +25,9 @@ struct Track {
 /// All tracks of the window, by id. Memory of ended tracks is used again.
 class TrackTable {
  public:
+  /// Takes the memory for so many tracks of so many observations each. More than that make it grow.
+  explicit TrackTable(std::size_t tracks = 0, std::size_t observations = 0);
+
   /// Appends the frame's observations; features not seen before start a track. Ids within a frame are distinct.
   void add(std::uint64_t frame, const std::vector<FeatureObservation>& features);
 
