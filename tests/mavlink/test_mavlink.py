@@ -23,6 +23,7 @@ SCRATCH = Path(sys.argv.pop(1)).resolve()
 HERE = Path(__file__).resolve().parent
 
 LOCAL_FRD, BODY_FRD, ESTIMATOR_VIO = 20, 12, 3
+WORDS = ("mode", "health")  # columns of states.csv that are no numbers
 ONBOARD_CONTROLLER, AUTOPILOT_INVALID, ACTIVE = 18, 8, 4
 THIS_COMPONENT = 197
 HALF_TURN = [[1, 0, 0], [0, -1, 0], [0, 0, -1]]
@@ -142,7 +143,7 @@ class Stream(unittest.TestCase):
         cls.packets = [json.loads(line) for line in node("decode.mjs", b"".join(controller.packets)).splitlines()]
         cls.sent = len(controller.packets)
         with (output / "states.csv").open(encoding="utf-8") as states:
-            cls.states = {int(row["t_ns"]) // 1000: {key: float(value) for key, value in row.items()}
+            cls.states = {int(row["t_ns"]) // 1000: {key: float(row[key]) for key in row if key not in WORDS}
                           for row in csv.DictReader(states)}
         cls.R_BV = vehicle_axes(cls.recording)
         cls.odometry = cls.fields("ODOMETRY")
