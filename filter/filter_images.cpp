@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "filter/median.h"
 #include "filter/relative_motion.h"
 
 namespace ear {
@@ -306,9 +307,7 @@ double Filter::median_parallax_px(const Clone& from, const Clone& to) const {
   if (static_cast<double>(parallax_.size()) < kCommonShare * static_cast<double>(seen) || parallax_.empty()) {
     return std::numeric_limits<double>::infinity();
   }
-  const auto middle = parallax_.begin() + static_cast<std::ptrdiff_t>(parallax_.size() / 2);
-  std::nth_element(parallax_.begin(), middle, parallax_.end());
-  return *middle;
+  return upper_median(parallax_);
 }
 
 int Filter::clone_index(std::uint64_t frame) const {

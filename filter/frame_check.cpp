@@ -15,12 +15,17 @@ constexpr double kLooser = 4.0;       // a wrong way must not look like a turn: 
 constexpr double kLeastWay = 1e-5;    // [m]
 constexpr double kLeastDepth = 1e-3;  // of a scaled point: smaller is beside or behind the camera
 
+/// Standard deviation of an inverse depth by stereo [1/m]. `sigma`: of one observation, normalized.
+double inverse_depth_sigma(double sigma, const CameraState& cameras) {
+  return std::sqrt(2.0) * sigma / cameras.T_C0C1.p.norm();
+}
+
 double share(int part, int of) { return of > 0 ? static_cast<double>(part) / of : 0.0; }
 
 }  // namespace
 
 double FrameCheck::share_behind(const FeatureFrame& frame, const CameraState& cameras, double noise) const {
-  const double sigma_s = std::sqrt(2.0) * noise * sigma_ / cameras.T_C0C1.p.norm();
+  const double sigma_s = inverse_depth_sigma(noise * sigma_, cameras);
   std::size_t seen = 0;
   int behind = 0;
   for (const FeatureObservation& feature : frame.features) {
@@ -41,7 +46,7 @@ FrameAgreement FrameCheck::compare(const FeatureFrame& from, const FeatureFrame&
 
   const Pose& T_BC0 = cameras.T_BC0;
   const Pose T_BC1 = {T_BC0.R * cameras.T_C0C1.R, T_BC0.R * cameras.T_C0C1.p + T_BC0.p};
-  const double baseline = cameras.T_C0C1.p.norm();
+  const double sigma_s = inverse_depth_sigma(sigma, cameras);
   const double way = motion.p_B0B1.norm();
   int off_left = 0, off_right = 0, seen_right = 0;
   // Of a turn and a way beyond the predicted ones, least squares; the way is known to some sigma_p.
@@ -51,7 +56,6 @@ FrameAgreement FrameCheck::compare(const FeatureFrame& from, const FeatureFrame&
     const double s = stereo_inverse_depth(cameras, match.left0, match.right0);
     // Noise of this observation and of the one that it starts from; of the depth, whose error the way makes visible;
     // of the way itself.
-    const double sigma_s = std::sqrt(2.0) * sigma / baseline;
     const double noise_variance = 2.0 * sigma * sigma + std::pow(way * sigma_s, 2);
     const double variance = noise_variance + std::pow(s * motion.sigma_p, 2);
     const Eigen::Vector3d g = T_BC0.R * match.left0.homogeneous() + s * T_BC0.p;

@@ -1,9 +1,9 @@
 #include "filter/image_noise.h"
 
-#include <algorithm>
 #include <cmath>
 
 #include "filter/capacity.h"
+#include "filter/median.h"
 #include "filter/so3.h"
 
 namespace ear {
@@ -11,13 +11,6 @@ namespace {
 
 constexpr std::size_t kFewest = 20;          // stereo features
 constexpr double kSigmasPerMedian = 1.4826;  // standard deviation over median absolute deviation of a normal variable
-
-/// Changes the order of `values`, which must not be empty.
-double median(std::vector<double>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 }  // namespace
 
@@ -36,9 +29,9 @@ double ImageNoise::measure(const FeatureFrame& frame, const CameraState& cameras
     if (gradient > 0.0) distances_.push_back(right.dot(line) / std::sqrt(gradient));  // to first order, Sampson's
   }
   if (distances_.size() < kFewest) return 0.0;
-  const double common = median(distances_);
+  const double common = upper_median(distances_);
   for (double& distance : distances_) distance = std::abs(distance - common);
-  return kSigmasPerMedian * median(distances_);
+  return kSigmasPerMedian * upper_median(distances_);
 }
 
 }  // namespace ear

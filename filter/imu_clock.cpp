@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "filter/clock_leap.h"
 #include "filter/stamp_guard.h"
 
 namespace ear {
@@ -11,8 +12,6 @@ namespace {
 constexpr std::size_t kCapacity = 512;
 constexpr std::size_t kMostWaiting = 256;  // samples: 0.25 s at 1 kHz
 constexpr double kLongestWait = 0.25;      // [s]
-constexpr double kLeap = 0.04;             // [s] off the usual interval, either way
-constexpr double kLargestLeap = 5.0;       // [s] beyond that it is another clock
 constexpr double kShare = 0.5;             // of the leap: readings that are off by less did not leap
 constexpr int kVotes = 2;                  // readings, for a verdict
 constexpr std::size_t kFewest = 3;         // samples after the leap: one false stamp is none
@@ -24,10 +23,7 @@ constexpr double kMemory = 100.0;          // samples, readings
 
 ImuClock::ImuClock() : samples_(kCapacity) {}
 
-bool ImuClock::leaps(double step) const {
-  const double off = std::abs(step - interval_);
-  return interval_ > 0.0 && off > kLeap && off < kLargestLeap;
-}
+bool ImuClock::leaps(double step) const { return interval_ > 0.0 && is_clock_leap(step - interval_); }
 
 /// Can the other sensors tell whose leap it is? Not if they measured meanwhile what the samples leave out.
 bool ImuClock::others_tell(double step) const {
@@ -43,7 +39,7 @@ bool ImuClock::others_tell(double step) const {
 void ImuClock::follow(TimeNs driver_ns) {
   if (last_ns_) {
     const double step = seconds_between(*last_ns_, driver_ns);
-    if (interval_ == 0.0 && step > 0.0) interval_ = std::min(step, kLeap);
+    if (interval_ == 0.0 && step > 0.0) interval_ = std::min(step, kClockLeap);
     if (!leaps(step)) interval_ += (step - interval_) / kMemory;
   }
   last_ns_ = driver_ns;

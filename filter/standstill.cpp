@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "filter/capacity.h"
+#include "filter/median.h"
 
 namespace ear {
 namespace {
@@ -96,11 +97,7 @@ std::optional<double> StandstillDetector::common_flow_px(const FeatureFrame& fra
   }
   if (flow_[0].size() < kMinCommonFeatures) return std::nullopt;
   double largest = 0.0;
-  for (auto& component : flow_) {
-    const auto middle = component.begin() + static_cast<std::ptrdiff_t>(component.size() / 2);
-    std::nth_element(component.begin(), middle, component.end());
-    largest = std::max(largest, std::abs(*middle));
-  }
+  for (auto& component : flow_) largest = std::max(largest, std::abs(upper_median(component)));
   return largest;
 }
 

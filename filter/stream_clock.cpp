@@ -3,15 +3,15 @@
 #include <algorithm>
 #include <cmath>
 
+#include "filter/clock_leap.h"
+
 namespace ear {
 namespace {
 
-constexpr int kToKnow = 20;           // readings until it is known how they usually come
-constexpr double kMemory = 100.0;     // readings
-constexpr double kLeap = 0.04;        // [s]
-constexpr double kLargestLeap = 5.0;  // [s] beyond that it is another clock
-constexpr double kShare = 0.5;        // of a leap, that its two measures may differ by
-constexpr double kPause = 5.0;        // intervals; after longer ones steps tell nothing
+constexpr int kToKnow = 20;        // readings until it is known how they usually come
+constexpr double kMemory = 100.0;  // readings
+constexpr double kShare = 0.5;     // of a leap, that its two measures may differ by
+constexpr double kPause = 5.0;     // intervals; after longer ones steps tell nothing
 
 }  // namespace
 
@@ -22,15 +22,15 @@ double StreamClock::leap_at(TimeNs t_ns, TimeNs now_ns) const {
   const double intervals = std::max(1.0, std::round(passed / interval_));
   const double leap = seconds_between(*last_ns_, t_ns) - intervals * interval_;
   const double ahead = seconds_between(now_ns, t_ns) - ahead_;
-  const bool is_leap = std::abs(leap) > kLeap && std::abs(leap) < kLargestLeap;
-  return is_leap && std::abs(ahead - leap) < kShare * std::abs(leap) ? leap : 0.0;
+  return is_clock_leap(leap) && std::abs(ahead - leap) < kShare * std::abs(leap) ? leap : 0.0;
 }
 
 void StreamClock::follow(TimeNs t_ns, std::optional<TimeNs> now_ns) {
   if (now_ns && last_ns_ && last_now_ns_) {
     const double step = seconds_between(*last_ns_, t_ns);
     const double share = std::max(1.0 / kMemory, 1.0 / (count_ + 1));
-    if (step > 0.0 && (count_ < kToKnow || std::abs(step - interval_) < kLeap)) interval_ += share * (step - interval_);
+    if (step > 0.0 && (count_ < kToKnow || std::abs(step - interval_) < kClockLeap))
+      interval_ += share * (step - interval_);
     ahead_ += share * (seconds_between(*now_ns, t_ns) - ahead_);
     ++count_;
   }
@@ -44,7 +44,7 @@ std::optional<TimeNs> StreamClock::correct(TimeNs stamp_ns, std::optional<TimeNs
   if (count_ >= kToKnow && now_ns && last_ns_ && last_now_ns_) {
     const double leap = leap_at(t_ns, *now_ns);
     if (leap != 0.0) {
-      const bool follows = suspect_ns_ && std::abs(seconds_between(*suspect_ns_, t_ns) - interval_) < kLeap;
+      const bool follows = suspect_ns_ && std::abs(seconds_between(*suspect_ns_, t_ns) - interval_) < kClockLeap;
       suspect_ns_ = t_ns;
       if (!follows) return std::nullopt;
       const auto leap_ns = static_cast<TimeNs>(std::llround(1e9 * leap));

@@ -65,14 +65,19 @@ Eigen::MatrixXd unobservable() {
   return N;
 }
 
+Eigen::MatrixXd random_rows(std::mt19937_64& rng, int rows) {
+  Eigen::MatrixXd J(rows, kSize);
+  for (double& entry : J.reshaped()) entry = random_vector(rng, 1.0).x();
+  return J;
+}
+
 }  // namespace
 
 TEST_CASE("prior: derivatives, also away from where it was linearized") {
   std::mt19937_64 rng{21};
   Blocks blocks(rng);
   const std::vector<PriorBlock> list = blocks.all();
-  Eigen::MatrixXd J(20, kSize);
-  for (double& entry : J.reshaped()) entry = random_vector(rng, 1.0).x();
+  const Eigen::MatrixXd J = random_rows(rng, 20);
   const PriorFactor prior(list, J, random_values(rng, 20, 1.0));
   std::vector<Eigen::VectorXd> values = values_of(list);
   for (Eigen::VectorXd& value : values)
@@ -84,8 +89,7 @@ TEST_CASE("prior: one that does not know yaw and position does not know them aft
   std::mt19937_64 rng{22};
   Blocks blocks(rng);
   const std::vector<PriorBlock> list = blocks.all();
-  Eigen::MatrixXd J(20, kSize);
-  for (double& entry : J.reshaped()) entry = random_vector(rng, 1.0).x();
+  Eigen::MatrixXd J = random_rows(rng, 20);
   const Eigen::MatrixXd N = unobservable();
   J -= J * N * (N.transpose() * N).inverse() * N.transpose();
   const PriorFactor prior(list, J, random_values(rng, 20, 1.0));
@@ -105,8 +109,7 @@ TEST_CASE("prior: what is left after marginalizing says the same of the rest as 
   std::mt19937_64 rng{23};
   Blocks blocks(rng);
   std::vector<PriorBlock> list = blocks.all();
-  Eigen::MatrixXd J(60, kSize);
-  for (double& entry : J.reshaped()) entry = random_vector(rng, 1.0).x();
+  const Eigen::MatrixXd J = random_rows(rng, 60);
   Factor factor;
   factor.cost = std::make_unique<PriorFactor>(list, J, random_values(rng, 60, 1.0));
   for (const PriorBlock& b : list) factor.blocks.push_back(b.block);

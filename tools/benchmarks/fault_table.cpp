@@ -26,6 +26,7 @@
 #include "tools/experiments/figures.h"
 #include "tools/experiments/in_parallel.h"
 #include "tools/experiments/seeds.h"
+#include "tools/experiments/statistics.h"
 #include "tools/progress.h"
 #include "tools/simulator/faults.h"
 #include "tools/simulator/sequence.h"
@@ -142,13 +143,6 @@ void tell(const std::string& title, const Log& log) {
 }
 
 // ---- Faults
-
-double median(std::vector<double> values) {
-  if (values.empty()) return std::nan("");
-  std::sort(values.begin(), values.end());
-  const std::size_t n = values.size();
-  return 0.5 * (values[(n - 1) / 2] + values[n / 2]);
-}
 
 double largest(const std::vector<double>& values) {
   return values.empty() ? std::nan("") : *std::max_element(values.begin(), values.end());

@@ -6,9 +6,10 @@
 #include <cstdio>
 #include <functional>
 #include <nlohmann/json.hpp>
-#include <numeric>
 #include <optional>
 #include <tuple>
+
+#include "tools/experiments/statistics.h"
 
 namespace ear::experiments {
 namespace {
@@ -16,16 +17,6 @@ namespace {
 using Json = nlohmann::ordered_json;
 using Values = std::vector<double>;
 using Field = std::optional<double> Figures::*;
-
-double median(Values values) {
-  std::sort(values.begin(), values.end());
-  const std::size_t middle = values.size() / 2;
-  return values.size() % 2 == 1 ? values[middle] : 0.5 * (values[middle - 1] + values[middle]);
-}
-
-double mean(const Values& values) {
-  return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
-}
 
 double worst(const Values& values) { return *std::max_element(values.begin(), values.end()); }
 

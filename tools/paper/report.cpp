@@ -8,6 +8,7 @@
 #include "tools/evaluation/evaluate.h"
 #include "tools/evaluation/plot.h"
 #include "tools/evaluation/report_page.h"
+#include "tools/experiments/statistics.h"
 #include "tools/paper/measure/configuration.h"
 
 namespace ear::paper {
@@ -126,17 +127,6 @@ Curve over_seeds(std::size_t place, const std::vector<Result>& runs, Number x, c
   return drawn;
 }
 
-double median(std::vector<double>& values) {
-  std::sort(values.begin(), values.end());
-  return 0.5 * (values[(values.size() - 1) / 2] + values[values.size() / 2]);
-}
-
-double mean(const std::vector<double>& values) {
-  double sum = 0.0;
-  for (const double value : values) sum += value;
-  return sum / static_cast<double>(values.size());
-}
-
 /// Error against the distance, against time where the vehicle hardly travels: median of the seeds.
 std::string error_panel(const Scene& scene) {
   const bool travels = scene.runs.front().second.front().length > 5.0;
@@ -144,7 +134,7 @@ std::string error_panel(const Scene& scene) {
   Plot plot = panel(travels ? "distance travelled [m]" : "time [s]", "error [m]", 190.0);
   for (const auto& [place, runs] : scene.runs) {
     plot.curves.push_back(over_seeds(
-        place, runs, x, [](const Moment& m) { return std::optional(m.error); }, median));
+        place, runs, x, [](const Moment& m) { return std::optional(m.error); }, experiments::median));
   }
   fit(plot);
   plot.y_range.first = 0.0;
@@ -158,7 +148,7 @@ std::string nees_panel(const Scene& scene) {
   for (const auto& [place, runs] : scene.runs) {
     plot.curves.push_back(over_seeds(
         place, runs, &Moment::t, [](const Moment& m) { return m.nees; },
-        [](const std::vector<double>& values) { return std::max(0.01, mean(values)); }));
+        [](const std::vector<double>& values) { return std::max(0.01, experiments::mean(values)); }));
   }
   fit(plot);
   plot.y_range = {-2.0, std::max(2.0, std::log10(std::max(1.0, plot.y_range.second)))};

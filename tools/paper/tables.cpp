@@ -6,16 +6,12 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "tools/experiments/statistics.h"
+
 namespace ear::paper {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-double median(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
-  const std::size_t middle = values.size() / 2;
-  return values.size() % 2 == 1 ? values[middle] : 0.5 * (values[middle - 1] + values[middle]);
-}
 
 Value over_seeds(const std::vector<Result>& results, Figure figure) {
   Value value;
@@ -26,7 +22,7 @@ Value over_seeds(const std::vector<Result>& results, Figure figure) {
     if (const std::optional<double> number = figure_of(result, figure)) figures.push_back(*number);
   }
   if (figures.empty() || 2 * figures.size() < results.size()) return value;
-  value.median = median(figures);
+  value.median = experiments::median(figures);
   const auto [least, most] = std::minmax_element(figures.begin(), figures.end());
   value.worst = figure == Figure::coverage ? *least : *most;
   return value;
