@@ -86,9 +86,9 @@ void CameraDisplacement::match(const Eigen::Matrix3d& R_BiBj) {
     if (before->id != now.id) continue;
     const Eigen::Vector3d lever_Bi = R_BiBj * now.p_BF;
     const Eigen::Matrix3d S = before->covariance + R_BiBj * now.covariance * R_BiBj.transpose();
-    const Eigen::LLT<Eigen::Matrix3d> llt(S);
-    if (llt.info() != Eigen::Success) continue;
-    pairs_.push_back({before->p_BF - lever_Bi, llt.solve(Eigen::Matrix3d::Identity()), lever_Bi});
+    const Eigen::Matrix3d information = S.inverse();
+    if (!information.allFinite()) continue;
+    pairs_.push_back({before->p_BF - lever_Bi, information, lever_Bi});
   }
 }
 

@@ -5,13 +5,84 @@
 #include <cassert>
 
 namespace ear {
+namespace {
+
+// Measurements of few rows (wheels, lasers, standstill) are the most frequent. Eigen's blocked products then mostly
+// arrange their blocks: plain sums over whole columns cost a third.
+constexpr int kFewRows = 12;
+
+/// result = P H^T, the columns of H that are zero left out.
+template <typename Block, typename Result>
+void multiply_few(const Block& P, const Eigen::Ref<const Eigen::MatrixXd>& H, Result& result) {
+  result.setZero();
+  for (Eigen::Index j = 0; j < H.cols(); ++j) {
+    for (Eigen::Index k = 0; k < H.rows(); ++k) {
+      if (H(k, j) != 0.0) result.col(k) += H(k, j) * P.col(j);
+    }
+  }
+}
+
+/// Y = Y L^-T for a lower triangular L.
+template <typename Matrix>
+void solve_few(const Eigen::Ref<const Eigen::MatrixXd>& L, Matrix& Y) {
+  for (Eigen::Index k = 0; k < Y.cols(); ++k) {
+    for (Eigen::Index l = 0; l < k; ++l) Y.col(k) -= L(k, l) * Y.col(l);
+    Y.col(k) /= L(k, k);
+  }
+}
+
+/// P - Y Y^T in the place of P's lower triangle, for the columns of Y from `first` on.
+template <int columns, typename Matrix, typename Symmetric>
+void subtract_square(const Matrix& Y, Eigen::Index first, Symmetric& P) {
+  const Eigen::Index n = P.rows();
+  for (Eigen::Index j = 0; j < n; ++j) {
+    const auto term = [&](Eigen::Index k) { return Y(j, first + k) * Y.col(first + k).tail(n - j); };
+    auto below = P.col(j).tail(n - j);
+    if constexpr (columns == 4) below -= (term(0) + term(1)) + (term(2) + term(3));
+    if constexpr (columns == 3) below -= term(0) + term(1) + term(2);
+    if constexpr (columns == 2) below -= term(0) + term(1);
+    if constexpr (columns == 1) below -= term(0);
+  }
+}
+
+template <typename Matrix, typename Symmetric>
+void subtract_square_of_few(const Matrix& Y, Symmetric& P) {
+  Eigen::Index k = 0;
+  for (; k + 4 <= Y.cols(); k += 4) subtract_square<4>(Y, k, P);
+  switch (Y.cols() - k) {
+    case 3:
+      return subtract_square<3>(Y, k, P);
+    case 2:
+      return subtract_square<2>(Y, k, P);
+    case 1:
+      return subtract_square<1>(Y, k, P);
+    default:
+      return;
+  }
+}
+
+/// Writes the lower triangle above the diagonal, in blocks: their rows are far apart in memory.
+template <typename Symmetric>
+void mirror_lower(Symmetric& P) {
+  constexpr int b = 4;
+  const Eigen::Index n = P.rows();
+  const Eigen::Index whole = n - n % b;
+  for (Eigen::Index j = 0; j < whole; j += b) {
+    for (Eigen::Index i = j + b; i < whole; i += b)
+      P.template block<b, b>(j, i) = P.template block<b, b>(i, j).transpose();
+    P.template block<b, b>(j, j).template triangularView<Eigen::StrictlyUpper>() =
+        P.template block<b, b>(j, j).transpose();
+  }
+  for (Eigen::Index i = whole; i < n; ++i) P.col(i).head(i) = P.row(i).head(i).transpose();
+}
+
+}  // namespace
 
 Covariance::Covariance(int capacity)
     : P_(Eigen::MatrixXd::Zero(capacity, capacity)),
       PHt_(capacity, capacity),
       S_(capacity, capacity),
       considered_(err::calibration_size, err::calibration_size),
-      scratch_(err::imu_size, capacity),
       whitened_(capacity),
       correction_(capacity) {}
 
@@ -24,23 +95,28 @@ void Covariance::reset(const Eigen::VectorXd& sigma) {
 
 void Covariance::propagate(const ErrorTransition& transition, const Eigen::Matrix<double, 3, 2>& B,
                            double normal_variance) {
-  constexpr int n = err::imu_size;
-  const int rest = size_ - n;
-  // delta + B^T theta is the normal's error in the world, which motion does not touch.
-  const auto add_rotation = [&](double sign) {
-    auto P = P_.topLeftCorner(size_, size_);
-    P.middleRows<2>(err::normal).noalias() += sign * B.transpose() * P.middleRows<3>(err::theta);
-    P.middleCols<2>(err::normal).noalias() += sign * P.middleCols<3>(err::theta) * B;
+  // delta + B^T theta is the normal's error in the world, which motion does not touch. So delta changes by -B^T times
+  // what theta does: a part of the gyroscope's bias, and noise.
+  constexpr int n = err::normal + 2;  // what changes
+  const Eigen::Matrix<double, 3, 2> gyro_to_normal = -transition.Phi.block<3, 3>(err::theta, err::b_g).transpose() * B;
+  const auto carry = [&](auto& M) {
+    carry_columns(transition.Phi, M);
+    M.template middleCols<2>(err::normal).noalias() += M.template middleCols<3>(err::b_g).lazyProduct(gyro_to_normal);
   };
-  add_rotation(1.0);
-  const ImuErrorMatrix PhiP = transition.Phi * P_.topLeftCorner<n, n>();
-  const ImuErrorMatrix P_imu = PhiP * transition.Phi.transpose() + transition.Q;
-  P_.topLeftCorner<n, n>() = 0.5 * (P_imu + P_imu.transpose());
-  scratch_.leftCols(rest).noalias() = transition.Phi * P_.block(0, n, n, rest);
-  P_.block(0, n, n, rest) = scratch_.leftCols(rest);
-  P_.block(n, 0, rest, n) = scratch_.leftCols(rest).transpose();
-  add_rotation(-1.0);
-  P_.diagonal().segment<2>(err::normal).array() += normal_variance;
+  auto P = P_.topLeftCorner(size_, size_);
+  carry(P);
+  Eigen::Matrix<double, n, n> corner = P.topLeftCorner<n, n>().transpose();
+  carry(corner);
+  corner.topLeftCorner<err::imu_size, err::imu_size>() += transition.Q;
+  const Eigen::Matrix<double, 2, 3> to_normal = -B.transpose();
+  const Eigen::Matrix<double, 2, err::imu_size> normal_Q = to_normal * transition.Q.topRows<3>();
+  corner.bottomLeftCorner<2, err::imu_size>() += normal_Q;
+  corner.topRightCorner<err::imu_size, 2>() += normal_Q.transpose();
+  corner.bottomRightCorner<2, 2>() += normal_Q.leftCols<3>() * to_normal.transpose();
+  corner.diagonal().tail<2>().array() += normal_variance;
+  P.topLeftCorner<n, n>() = 0.5 * (corner + corner.transpose());
+  const int rest = size_ - n;
+  P.topRightCorner(n, rest) = P.bottomLeftCorner(rest, n).transpose();
 }
 
 void Covariance::restart(int first, const Eigen::Ref<const Eigen::VectorXd>& sigma) {
@@ -101,9 +177,15 @@ Eigen::Ref<const Eigen::VectorXd> Covariance::update(const Eigen::Ref<const Eige
   auto PHt = PHt_.topLeftCorner(n, m);
   auto S = S_.topLeftCorner(m, m);
   auto z = whitened_.head(m);
+  const bool few = m <= kFewRows;
 
-  PHt.noalias() = P.middleCols(first_column, H.cols()) * H.transpose();
-  S.noalias() = H * PHt.middleRows(first_column, H.cols());
+  const auto P_seen = P.middleCols(first_column, H.cols());
+  if (few) {
+    multiply_few(P_seen, H, PHt);
+  } else {
+    PHt.noalias() = P_seen * H.transpose();
+  }
+  S.triangularView<Eigen::Lower>() = H * PHt.middleRows(first_column, H.cols());  // the other is not read
   S.diagonal().array() += 1.0;
   auto correction = correction_.head(n);
   correction.setZero();
@@ -112,12 +194,17 @@ Eigen::Ref<const Eigen::VectorXd> Covariance::update(const Eigen::Ref<const Eige
   if (llt.info() != Eigen::Success || !residual.allFinite() || !H.allFinite()) return correction;
   z = residual;
   llt.matrixL().solveInPlace(z);
-  llt.matrixU().solveInPlace<Eigen::OnTheRight>(PHt);  // Y = P H^T L^-T, so that P H^T S^-1 H P = Y Y^T
-
+  // Y = P H^T L^-T, in the place of P H^T, so that P H^T S^-1 H P = Y Y^T
   const auto c = considered_count;
   considered_.topLeftCorner(c, c) = P.block(considered_first, considered_first, c, c);
-  P.selfadjointView<Eigen::Lower>().rankUpdate(PHt, -1.0);
-  P.triangularView<Eigen::StrictlyUpper>() = P.transpose();
+  if (few) {
+    solve_few(factor, PHt);
+    subtract_square_of_few(PHt, P);
+  } else {
+    llt.matrixU().solveInPlace<Eigen::OnTheRight>(PHt);
+    P.selfadjointView<Eigen::Lower>().rankUpdate(PHt, -1.0);
+  }
+  mirror_lower(P);
   P.block(considered_first, considered_first, c, c) = considered_.topLeftCorner(c, c);
 
   correction.noalias() = PHt * z;

@@ -58,7 +58,7 @@ class Covariance {
 
   Eigen::MatrixXd P_;
   int size_ = 0;
-  Eigen::MatrixXd PHt_, S_, considered_, scratch_;
+  Eigen::MatrixXd PHt_, S_, considered_;
   Eigen::VectorXd whitened_, correction_;
 };
 

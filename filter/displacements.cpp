@@ -92,6 +92,18 @@ Displacement imu_displacement(const ImuMotion& motion, const Covariance& P) {
   return result;
 }
 
+WheelNoise wheel_noise(const OdometerConfig& odometer, const Calibration& calibration) {
+  const EncoderCalibration& encoder = *calibration.encoder;
+  WheelNoise noise;
+  noise.gyro = calibration.imu.gyro_noise;
+  noise.reading = encoder.noise_counts * 2.0 * M_PI / static_cast<double>(encoder.resolution);
+  noise.slip = odometer.slip;
+  noise.side_slip = odometer.side_slip;
+  noise.roughness = odometer.roughness;
+  noise.normal_walk = odometer.normal_walk;
+  return noise;
+}
+
 Displacement wheel_displacement(const State& x, const Covariance& P, const TurnsBetween& turns,
                                 const ImuBuffer& samples, TimeNs to_ns, const WheelSetting& setting) {
   const OdometerState& odometer = x.odometer;

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "ear/calibration.h"
+#include "ear/filter_config.h"
 #include "filter/consistency.h"
 #include "filter/covariance.h"
 #include "filter/imu_buffer.h"
@@ -32,6 +33,9 @@ struct ImuMotion {
 
 /// `P`: covariance of the error at i.
 [[nodiscard]] Displacement imu_displacement(const ImuMotion& motion, const Covariance& P);
+
+/// What the settings and the calibration, which has an encoder, say of the wheels' noise.
+[[nodiscard]] WheelNoise wheel_noise(const OdometerConfig& odometer, const Calibration& calibration);
 
 /// What the wheels' displacement needs to know beside the readings.
 struct WheelSetting {

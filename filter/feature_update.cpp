@@ -8,43 +8,46 @@
 namespace ear {
 namespace {
 
-constexpr int kCalibration = 12;            // columns of the cameras' poses; the time offset acts through the clones
-constexpr double kNegligiblePivot = 1e-11;  // of the sum before projection: rounding, not information
+constexpr int kCalibration = 12;  // columns of the cameras' poses; the time offset acts through the clones
 
 /// First column of a clone, counted from err::camera.
 constexpr int clone_column(int clone) { return err::clone(clone) - err::camera; }
 
-/// The rows of which A = H^T H and b = H^T r are the sums: Cholesky with diagonal pivoting. A, of which only the lower
-/// triangle is read, is singular (yaw and position are free, calibration is seen in part). The largest pivot against
-/// `scale` comes first, so that rounding does not grow; one lost in rounding says nothing, and ends it. Without the
-/// pivoting rounding makes up rows, and once in some ten thousand frames one that moves the estimate by ten sigmas.
-/// A and b are overwritten.
-void rows_from_sums(Eigen::Ref<Eigen::MatrixXd> A, Eigen::Ref<Eigen::VectorXd> b, const Eigen::VectorXd& scale,
+/// The rows of which A = H^T H and b = H^T r are the sums: Cholesky with diagonal pivoting, row by row. A, of which
+/// only the lower triangle is read, is singular (yaw and position are free, calibration is seen in part). The largest
+/// pivot against `scale` comes first, so that rounding does not grow; one lost in rounding says nothing, and ends it.
+/// Without the pivoting rounding makes up rows, and once in some ten thousand frames one that moves the estimate by ten
+/// sigmas. b and `pivots`, at first the diagonal of A, are overwritten.
+void rows_from_sums(const Eigen::Ref<const Eigen::MatrixXd>& A, Eigen::Ref<Eigen::VectorXd> b,
+                    Eigen::Ref<Eigen::VectorXd> pivots, const Eigen::VectorXd& scale, double negligible,
                     WhitenedRows& rows) {
   const int size = static_cast<int>(b.size());
+  auto& Ht = rows.H_transposed;
   rows.count = 0;
   while (rows.count < size) {
     int j = 0;
     double largest = 0.0;
     for (int k = 0; k < size; ++k) {
-      const double pivot = A(k, k);
-      if (pivot <= largest * scale(k)) continue;
-      largest = pivot / scale(k);
+      if (pivots(k) <= largest * scale(k)) continue;
+      largest = pivots(k) / scale(k);
       j = k;
     }
-    if (largest <= kNegligiblePivot) return;
-    const double root = std::sqrt(A(j, j));
-    auto u = rows.H.row(rows.count).head(size);
-    u.head(j) = A.row(j).head(j) / root;
+    if (largest <= negligible) break;
+    const double root = std::sqrt(pivots(j));
+    auto u = Ht.col(rows.count).head(size);
+    u.head(j) = A.row(j).head(j).transpose();
+    u.tail(size - j) = A.col(j).tail(size - j);
+    u.noalias() -= Ht.topLeftCorner(size, rows.count) * Ht.row(j).head(rows.count).transpose();
+    u /= root;
+    u = (pivots.array() > 0.0).select(u, 0.0);  // those that came before are done
     u(j) = root;
-    u.tail(size - j - 1) = A.col(j).tail(size - j - 1).transpose() / root;
     rows.r(rows.count) = b(j) / root;
-    b -= rows.r(rows.count) * u.transpose();
-    A.selfadjointView<Eigen::Lower>().rankUpdate(u.transpose(), -1.0);
-    A.row(j).head(j + 1).setZero();
-    A.col(j).tail(size - j - 1).setZero();
+    b -= rows.r(rows.count) * u;
+    pivots -= u.cwiseAbs2();
+    pivots(j) = 0.0;
     ++rows.count;
   }
+  rows.H.topLeftCorner(rows.count, size) = Ht.topLeftCorner(size, rows.count).transpose();
 }
 
 }  // namespace
@@ -109,10 +112,11 @@ LinearizedObservation linearize_observation(const Pose& T_WB, const CameraState&
 
 FeatureInformation::FeatureInformation(int max_clones, int max_features) {
   const int size = err::clone(max_clones) - err::camera;
-  for (Eigen::MatrixXd* const matrix : {&A_, &feature_A_, &gate_A_, &gate_PHt_, &rows_.H, &gate_rows_.H}) {
+  for (Eigen::MatrixXd* const matrix :
+       {&A_, &gate_A_, &gate_PHt_, &rows_.H, &rows_.H_transposed, &gate_rows_.H, &gate_rows_.H_transposed}) {
     matrix->resize(size, size);
   }
-  for (Eigen::VectorXd* const vector : {&b_, &feature_b_, &gate_b_, &scale_, &rows_.r, &gate_rows_.r}) {
+  for (Eigen::VectorXd* const vector : {&b_, &gate_b_, &scale_, &pivots_, &rows_.r, &gate_rows_.r}) {
     vector->resize(size);
   }
   W_.resize(size, 3 * max_features);
@@ -151,46 +155,56 @@ bool FeatureInformation::add_gated(const std::vector<LinearizedObservation>& obs
   if (V_llt.info() != Eigen::Success || !std::isfinite(cost)) return false;
   const Eigen::Vector3d Lv = V_llt.matrixL().solve(v);
 
-  feature_A_.topLeftCorner(size_, size_).setZero();
-  feature_b_.head(size_).setZero();
   auto W = W_.block(0, 3 * features_, size_, 3);
   W.setZero();
+  for (std::size_t i = 0; i < observations.size(); ++i) {
+    const LinearizedObservation& z = observations[i];
+    const Eigen::Matrix<double, 2, 3> wH_f = weights_[i] * z.H_f;
+    W.topRows<kCalibration>().noalias() += z.H_calibration.transpose().lazyProduct(wH_f);
+    W.middleRows<err::clone_size>(clone_column(z.clone)).noalias() += z.H_clone.transpose().lazyProduct(wH_f);
+  }
+  V_llt.matrixU().solveInPlace<Eigen::OnTheRight>(W);
+
+  // With P = 0 the statistic is largest: who passes then passes anyway, and the full test is not needed.
+  const double residual_cost = cost - Lv.squaredNorm();
+  if (residual_cost > threshold && chi_squared(observations, Lv, P, residual_cost) > threshold) return false;
+  sum_up(observations, Lv, A_, b_);
+  ++features_;
+  return true;
+}
+
+/// Adds the feature at hand, the last in W_, to A and b: its own block is not yet projected out of A, but out of b.
+void FeatureInformation::sum_up(const std::vector<LinearizedObservation>& observations, const Eigen::Vector3d& Lv,
+                                Eigen::MatrixXd& A, Eigen::VectorXd& b) const {
   for (std::size_t i = 0; i < observations.size(); ++i) {
     const LinearizedObservation& z = observations[i];
     const double w = weights_[i];
     const int at = clone_column(z.clone);
     const Eigen::Matrix<double, kCalibration, 2> Hw_cal = w * z.H_calibration.transpose();
     const Eigen::Matrix<double, err::clone_size, 2> Hw_clone = w * z.H_clone.transpose();
-    feature_A_.topLeftCorner<kCalibration, kCalibration>().noalias() += Hw_cal * z.H_calibration;
-    feature_A_.block<err::clone_size, kCalibration>(at, 0).noalias() += Hw_clone * z.H_calibration;
-    feature_A_.block<err::clone_size, err::clone_size>(at, at).noalias() += Hw_clone * z.H_clone;
-    feature_b_.head<kCalibration>().noalias() += Hw_cal * z.residual;
-    feature_b_.segment<err::clone_size>(at).noalias() += Hw_clone * z.residual;
-    W.topRows<kCalibration>().noalias() += Hw_cal * z.H_f;
-    W.middleRows<err::clone_size>(at).noalias() += Hw_clone * z.H_f;
+    A.topLeftCorner<kCalibration, kCalibration>().noalias() += Hw_cal.lazyProduct(z.H_calibration);
+    A.block<err::clone_size, kCalibration>(at, 0).noalias() += Hw_clone.lazyProduct(z.H_calibration);
+    A.block<err::clone_size, err::clone_size>(at, at).noalias() += Hw_clone.lazyProduct(z.H_clone);
+    b.head<kCalibration>().noalias() += Hw_cal.lazyProduct(z.residual);
+    b.segment<err::clone_size>(at).noalias() += Hw_clone.lazyProduct(z.residual);
   }
-  V_llt.matrixU().solveInPlace<Eigen::OnTheRight>(W);
-  feature_b_.head(size_).noalias() -= W * Lv;
-
-  // With P = 0 the statistic is largest: who passes then passes anyway, and the full test is not needed.
-  const double residual_cost = cost - Lv.squaredNorm();
-  if (residual_cost > threshold && chi_squared(P, residual_cost) > threshold) return false;
-  A_.topLeftCorner(size_, size_).triangularView<Eigen::Lower>() += feature_A_.topLeftCorner(size_, size_);
-  b_.head(size_) += feature_b_.head(size_);
-  ++features_;
-  return true;
+  b.head(size_).noalias() -= W_.block(0, 3 * features_, size_, 3) * Lv;
 }
 
 /// r^T (H P H^T + I)^-1 r over all rows of the feature at hand, the last in W_. `residual_cost`: r^T r. What the
 /// projected rows do not show of r is noise alone.
-double FeatureInformation::chi_squared(const Eigen::Ref<const Eigen::MatrixXd>& P, double residual_cost) {
+double FeatureInformation::chi_squared(const std::vector<LinearizedObservation>& observations,
+                                       const Eigen::Vector3d& Lv, const Eigen::Ref<const Eigen::MatrixXd>& P,
+                                       double residual_cost) {
   auto A = gate_A_.topLeftCorner(size_, size_);
   auto b = gate_b_.head(size_);
-  A.triangularView<Eigen::Lower>() = feature_A_.topLeftCorner(size_, size_);
-  b = feature_b_.head(size_);
+  A.setZero();
+  b.setZero();
+  sum_up(observations, Lv, gate_A_, gate_b_);
   scale_.head(size_) = A.diagonal();
   A.selfadjointView<Eigen::Lower>().rankUpdate(W_.block(0, 3 * features_, size_, 3), -1.0);
-  rows_from_sums(A, b, scale_, gate_rows_);
+  pivots_.head(size_) = A.diagonal();
+  rows_from_sums(A, b, pivots_.head(size_), scale_, kRounding, gate_rows_);
 
   const int rows = gate_rows_.count;
   const auto H = gate_rows_.H.topLeftCorner(rows, size_);
@@ -206,13 +220,14 @@ double FeatureInformation::chi_squared(const Eigen::Ref<const Eigen::MatrixXd>& 
   return noise_cost + r.squaredNorm();
 }
 
-void FeatureInformation::compress() {
+void FeatureInformation::compress(double negligible) {
   rows_.count = 0;
   if (features_ == 0) return;
   auto A = A_.topLeftCorner(size_, size_);
   scale_.head(size_) = A.diagonal();
   A.selfadjointView<Eigen::Lower>().rankUpdate(W_.topLeftCorner(size_, 3 * features_), -1.0);
-  rows_from_sums(A, b_.head(size_), scale_, rows_);
+  pivots_.head(size_) = A.diagonal();
+  rows_from_sums(A, b_.head(size_), pivots_.head(size_), scale_, negligible, rows_);
 }
 
 }  // namespace ear

@@ -40,6 +40,7 @@ void camera_poses(const State& x, std::vector<CameraPose>& poses);
 /// Linear measurement with unit covariance: residual r = H e + n, cov(n) = I. The first `count` rows are valid.
 struct WhitenedRows {
   Eigen::MatrixXd H;
+  Eigen::MatrixXd H_transposed;
   Eigen::VectorXd r;
   int count = 0;
 };
@@ -65,24 +66,28 @@ class FeatureInformation {
     return dof > 0 && add_gated(observations, sigma, huber, P, gate(dof));
   }
 
+  static constexpr double kRounding = 1e-11;
+
   /// Rows equivalent to all features added: residual = H e + n, cov(n) = I. Empty if there were none. Valid until
-  /// start().
-  void compress();
+  /// start(). `negligible`: the share of what the features tell of a quantity, were they known themselves, that need
+  /// not be told; smaller ones come last.
+  void compress(double negligible = kRounding);
   [[nodiscard]] Eigen::Ref<const Eigen::MatrixXd> H() const { return rows_.H.topLeftCorner(rows_.count, size_); }
   [[nodiscard]] Eigen::Ref<const Eigen::VectorXd> residual() const { return rows_.r.head(rows_.count); }
 
  private:
   bool add_gated(const std::vector<LinearizedObservation>& observations, double sigma, double huber,
                  const Eigen::Ref<const Eigen::MatrixXd>& P, double threshold);
-  [[nodiscard]] double chi_squared(const Eigen::Ref<const Eigen::MatrixXd>& P, double residual_cost);
+  [[nodiscard]] double chi_squared(const std::vector<LinearizedObservation>& observations, const Eigen::Vector3d& Lv,
+                                   const Eigen::Ref<const Eigen::MatrixXd>& P, double residual_cost);
+  void sum_up(const std::vector<LinearizedObservation>& observations, const Eigen::Vector3d& Lv, Eigen::MatrixXd& A,
+              Eigen::VectorXd& b) const;
 
   int size_ = 0;      // columns: the camera's part of the error vector
   int features_ = 0;  // in W_
   WhitenedRows rows_;
   Eigen::MatrixXd A_, W_;  // W_: H^T H_f V^-1/2 of each feature, 3 columns each
-  Eigen::VectorXd b_, scale_;
-  Eigen::MatrixXd feature_A_;  // of the feature at hand, before projection
-  Eigen::VectorXd feature_b_;
+  Eigen::VectorXd b_, scale_, pivots_;
   std::vector<double> weights_;  // of its observations: Huber's, over the variance
   WhitenedRows gate_rows_;
   Eigen::MatrixXd gate_A_, gate_PHt_;

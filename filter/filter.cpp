@@ -20,6 +20,7 @@ constexpr double kHeldSample = 0.04;         // [s] so far the newest IMU sample
 constexpr double kLifting = 0.3;             // [s] after wheels that leave the ground, or meet it, as it seems
 constexpr std::size_t kMaxCompared = 512;    // features of a frame whose motion is compared with other sensors
 
+constexpr int kLeastWindow = 3;    // clones
 constexpr int kClonePairRows = 9;  // that a measurement between the state and one clone has
 
 int error_capacity(const FilterConfig& config) { return err::clone(config.window + 1); }
@@ -59,7 +60,13 @@ Filter::Filter(const FilterConfig& config, const Calibration& calibration)
   state_.camera = camera_state(calibration);
   state_.odometer = odometer_state(calibration);
   if (calibration.encoder && config.odometer.model != OdometerModel::none) encoder_.emplace(*calibration.encoder);
+  set_window(config.window);
   take_memory();
+}
+
+void Filter::set_window(int clones) {
+  const int least = std::min(kLeastWindow, config_.window);
+  window_ = static_cast<std::size_t>(std::clamp(clones, least, config_.window));
 }
 
 /// All that process() and the samples will need.
@@ -250,6 +257,7 @@ std::optional<Estimate> Filter::finish_frame(bool image, const FrameAgreement& a
   HealthMonitor::Frame frame;
   frame.t_ns = imu_time(last_frame_ns_);
   frame.image = image;
+  frame.right = !right_skipped_;
   frame.running = status_ == Status::tracking;
   frame.agreement = agreement;
   frame.statistics = statistics_;
@@ -283,7 +291,7 @@ bool Filter::possible() const {
   const bool finite = x.R_WB.allFinite() && x.p_WB.allFinite() && x.v_W.allFinite() && x.b_g.allFinite() &&
                       x.b_a.allFinite() && state_.camera.T_BC0.R.allFinite() && state_.camera.T_BC0.p.allFinite() &&
                       o.wheel_radius.allFinite() && std::isfinite(o.wheel_separation) && o.T_BO.R.allFinite() &&
-                      state_.ground.n_W.allFinite() && P.allFinite();
+                      state_.ground.n_W.allFinite() && std::isfinite(P.sum());  // one that is not makes the sum so
   return finite && P.diagonal().minCoeff() >= 0.0;
 }
 
@@ -320,6 +328,7 @@ std::optional<Estimate> Filter::process_without_image(TimeNs t_ns) {
 bool Filter::begin_frame(const FeatureFrame& frame, bool frozen) {
   any_frame_ = true;
   last_frame_ns_ = frame.t_ns;
+  right_skipped_ = frame.right_skipped;
   statistics_ = FrameStatistics{};
   feature_noise_ = noise_of(frame);
   consistency_ = Consistency{};

@@ -25,6 +25,7 @@
 #include "filter/consistency.h"
 #include "filter/contact.h"
 #include "filter/covariance.h"
+#include "filter/estimator.h"
 #include "filter/feature_update.h"
 #include "filter/frame_check.h"
 #include "filter/health_monitor.h"
@@ -46,56 +47,54 @@
 
 namespace ear {
 
-/// How the body moved between two frames.
-struct RelativeMotion {
-  Eigen::Matrix3d R_B1B0 = Eigen::Matrix3d::Identity();
-  Eigen::Vector3d p_B0B1 = Eigen::Vector3d::Zero();  ///< [m]
-  bool translation_known = false;
-};
-
-class Filter {
+class Filter final : public Estimator {
  public:
   /// Throws std::invalid_argument, naming the field, if a setting or the calibration is unusable.
   Filter(const FilterConfig& config, const Calibration& calibration);
 
   /// Takes a sample in time order. One that is not finite, implausible or not later than the one before is refused and
   /// counted. Its stamps are the clock: after a hole of 2 s, or when they go on from an earlier time, all begins anew.
-  void add_imu(const ImuSample& sample);
+  void add_imu(const ImuSample& sample) override;
 
   /// Takes a reading in time order; it is used at its own time when the state passes it. One that is not later than the
   /// one before, far behind the state or far ahead of the inertial samples, is refused and counted. Without a
   /// calibration of its sensor it is ignored.
-  void add_encoder(const EncoderSample& sample);
-  void add_laser(const LaserSample& sample);
+  void add_encoder(const EncoderSample& sample) override;
+  void add_laser(const LaserSample& sample) override;
 
   /// How the body moved from the last processed frame to a frame stamped `t_ns`: for a front end to track with. Before
   /// the start only the rotation is known. Nothing if no frame came yet, or no samples.
-  [[nodiscard]] std::optional<RelativeMotion> motion_to(TimeNs t_ns) const;
+  [[nodiscard]] std::optional<RelativeMotion> motion_to(TimeNs t_ns) const override;
 
   /// A camera's stamp by the common clock, should the camera's own have leapt; nothing for a frame that is not to be
   /// used, as this is not known yet. For who has the stamps as the driver gives them, once for each frame as it comes.
-  [[nodiscard]] std::optional<TimeNs> common_stamp(TimeNs camera_stamp_ns);
+  [[nodiscard]] std::optional<TimeNs> common_stamp(TimeNs camera_stamp_ns) override;
 
   /// Takes the features of one frame. The estimate at the frame's time, or nothing while it cannot start. Features that
   /// are not finite, that no camera can see, or that come twice are left out and counted.
-  std::optional<Estimate> process(const FeatureFrame& frame);
+  std::optional<Estimate> process(const FeatureFrame& frame) override;
 
   /// The same at a time without an image, from all other sensors; a camera's stamp. Tracks go on over it. Nothing where
   /// these have nothing to tell: with cameras, off the ground. Images that come late can then still be used.
-  std::optional<Estimate> process_without_image(TimeNs t_ns);
+  std::optional<Estimate> process_without_image(TimeNs t_ns) override;
 
   /// The newest state carried on by the samples to `t_ns` (IMU time). Nothing before the start, while lost, and later
   /// than 0.5 s after the newest sample.
-  [[nodiscard]] std::optional<NavState> predict(TimeNs t_ns) const;
+  [[nodiscard]] std::optional<NavState> predict(TimeNs t_ns) const override;
 
-  [[nodiscard]] Status status() const;
-  [[nodiscard]] const Health& health() const { return monitor_.health(); }
+  [[nodiscard]] Status status() const override;
+  [[nodiscard]] const Health& health() const override { return monitor_.health(); }
+  /// Keeps no more than so many clones from the next frame on, at least 3 and at most FilterConfig::window.
+  void set_window(int clones) override;
   /// Tells the health of a frame that no inertial samples reach.
-  void refuse_frame();
-  [[nodiscard]] InputCounts input_counts() const;  ///< of samples; frames are the caller's
-  [[nodiscard]] bool covers(TimeNs t_ns) const;    ///< are there inertial samples (nearly) up to the frame's time?
-  [[nodiscard]] bool is_next(TimeNs t_ns) const;   ///< is a frame with this stamp later than the one before?
-  [[nodiscard]] TimeNs camera_time(TimeNs imu_time_ns) const;  ///< the stamp that the camera has at that time
+  void refuse_frame() override;
+  [[nodiscard]] InputCounts input_counts() const override;  ///< of samples; frames are the caller's
+  /// Are there inertial samples (nearly) up to the frame's time?
+  [[nodiscard]] bool covers(TimeNs t_ns) const override;
+  [[nodiscard]] bool is_next(TimeNs t_ns) const override;  ///< is a frame with this stamp later than the one before?
+  [[nodiscard]] TimeNs camera_time(TimeNs imu_time_ns) const override;  ///< the stamp that the camera has at that time
+  [[nodiscard]] CameraState cameras() const override { return state_.camera; }
+  [[nodiscard]] OdometerState odometer() const override { return state_.odometer; }
   [[nodiscard]] const State& state() const { return state_; }
   [[nodiscard]] const Covariance& covariance() const { return covariance_; }
 
@@ -123,8 +122,6 @@ class Filter {
     ImuClock imu;
     StreamClock encoder, camera;
   };
-
-  static constexpr TimeNs kDisagrees = -1;
 
   // filter.cpp
   void take_memory();
@@ -177,11 +174,9 @@ class Filter {
 
   // filter_ground.cpp
   [[nodiscard]] Displacement displacement_by_wheels(TimeNs until_ns) const;
-  [[nodiscard]] WheelNoise wheel_noise() const;
   void log_wheels(const WheelRows& rows, const Eigen::Matrix<double, WheelRows::size, 1>& sigma, TimeNs t_ns);
   void note_contact(ContactEvent event);
   [[nodiscard]] bool rolls_at(TimeNs t_ns) const;
-  static bool agrees_again(TimeNs& since_ns, bool passes, TimeNs t_ns);
   void update_with_wheels(const WheelTurn& turn);
   bool choose_wheels(WheelRows& rows, Eigen::Vector4d& sigma, const WheelTurn& turn);
   void start_displacement();
@@ -199,6 +194,7 @@ class Filter {
   [[nodiscard]] FrameAgreement check_frame(const FeatureFrame& frame);
   void go_on_blind(bool still);
   void use_image(const FeatureFrame& frame, bool still);
+  void note_features_used();
   void log_features();
   void hold_still();
   void append_clone();
@@ -248,7 +244,9 @@ class Filter {
   StandstillDetector standstill_;
   TrackTable tracks_;
   std::uint64_t next_frame_ = 0;
-  TimeNs last_frame_ns_ = 0;  ///< camera stamp of the last frame processed
+  std::size_t window_ = 0;      ///< clones kept for now
+  bool right_skipped_ = false;  ///< in the frame at hand
+  TimeNs last_frame_ns_ = 0;    ///< camera stamp of the last frame processed
   bool any_frame_ = false;
   Pose image_T_WB_;                                         ///< body at the last image
   Eigen::Vector3d image_rate_B_ = Eigen::Vector3d::Zero();  ///< its rate then [rad/s]
@@ -256,6 +254,8 @@ class Filter {
   FeatureFrame last_features_;                              ///< its features
   bool any_image_ = false;
   bool noiseless_camera_ = false;   ///< its images repeat while nothing moves: that means nothing
+  TimeNs fed_ns_ = 0;               ///< when features last told enough of where the vehicle is
+  int fed_features_ = 0;            ///< used since then
   bool clone_is_here_ = false;      ///< the newest clone was made where the vehicle is, if it stands
   bool learn_calibration_ = false;  ///< standing tells nothing about it
   FrameStatistics statistics_;

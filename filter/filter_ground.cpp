@@ -16,7 +16,6 @@ constexpr double kSpinUp = 0.1;                // [s] after a touchdown until th
 constexpr double kTakeoffVelocity = 0.05;      // [m/s] what the odometer was wrong by before a take-off was noticed
 constexpr double kTakeoffPosition = 5e-3;      // [m] what came of it
 constexpr double kDoubtTime = 0.5;             // [s] the contradiction of two wheels is one error so long
-constexpr double kSlipEnds = 0.15;             // [s] of agreement before a row that failed its gate is used again
 constexpr double kLevelOff = 0.05;             // [m] of a plane from the wheels that stand on it
 constexpr double kLeanOff = 0.2;               // sine of the axle's angle to it
 constexpr int kPatience = 25;                  // readings of the lasers
@@ -43,32 +42,9 @@ bool Filter::rolls_at(TimeNs t_ns) const {
 Displacement Filter::displacement_by_wheels(TimeNs until_ns) const {
   const bool terrain = config_.odometer.model == OdometerModel::terrain && beam_count_ > 0;
   if (!encoder_ || !rolls_at(state_.imu.t_ns) || (terrain && !ground_known_)) return {};
-  const WheelSetting setting{wheel_model(state_.odometer), wheel_noise(), config_.odometer.speed_sigma,
-                             config_.odometer.side_slip_turn, terrain};
+  const WheelSetting setting{wheel_model(state_.odometer), wheel_noise(config_.odometer, calibration_),
+                             config_.odometer.speed_sigma, config_.odometer.side_slip_turn, terrain};
   return wheel_displacement(state_, covariance_, TurnsBetween(passed_turn_, turns_), imu_, until_ns, setting);
-}
-
-WheelNoise Filter::wheel_noise() const {
-  const OdometerConfig& odometer = config_.odometer;
-  const EncoderCalibration& encoder = *calibration_.encoder;
-  WheelNoise noise;
-  noise.gyro = calibration_.imu.gyro_noise;
-  noise.reading = encoder.noise_counts * 2.0 * M_PI / static_cast<double>(encoder.resolution);
-  noise.slip = odometer.slip;
-  noise.side_slip = odometer.side_slip;
-  noise.roughness = odometer.roughness;
-  noise.normal_walk = odometer.normal_walk;
-  return noise;
-}
-
-/// A wheel that slips comes back through the speeds that the gate lets pass: it must have agreed for a while.
-bool Filter::agrees_again(TimeNs& since_ns, bool passes, TimeNs t_ns) {
-  if (!passes) {
-    since_ns = kDisagrees;
-    return false;
-  }
-  if (since_ns == kDisagrees) since_ns = t_ns;
-  return seconds_between(since_ns, t_ns) >= kSlipEnds;
 }
 
 void Filter::update_with_wheels(const WheelTurn& turn) {
@@ -181,7 +157,7 @@ void Filter::log_wheels(const WheelRows& rows, const Eigen::Matrix<double, Wheel
 void Filter::start_displacement() {
   displacement_.reset();
   if (!on_ground() || !ground_known_ || config_.odometer.update != OdometerUpdate::displacement) return;
-  displacement_.emplace(wheel_model(state_.odometer), wheel_noise());
+  displacement_.emplace(wheel_model(state_.odometer), wheel_noise(config_.odometer, calibration_));
   displacement_->start(state_.imu.R_WB.transpose() * state_.ground.n_W, state_.imu.b_g);
   displacement_ns_ = state_.imu.t_ns;
 }

@@ -3,21 +3,22 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
-#include "filter/median.h"
+#include "filter/parallax.h"
 #include "filter/relative_motion.h"
 
 namespace ear {
 namespace {
 
-constexpr double kBridgeRotation = 2e-3;     // [rad] standard deviations with which two images tell of the motion:
-constexpr double kBridgePosition = 5e-3;     // [m] well above what the features will tell later
-constexpr std::size_t kFewestRepeated = 8;   // features, for two images to be the same
-constexpr double kFeigned = 3.0;             // standard deviations of the cameras' calibration that feign a turn
-constexpr double kOldImage = 0.5;            // [s] after which frames have little in common
-constexpr double kCommonShare = 0.5;         // of its features, that the elder of a copy must have seen
-constexpr double kNoisy = 1.25;              // times the usual standard deviation of a feature: less may be chance
+constexpr double kBridgeRotation = 2e-3;    // [rad] standard deviations with which two images tell of the motion:
+constexpr double kBridgePosition = 5e-3;    // [m] well above what the features will tell later
+constexpr std::size_t kFewestRepeated = 8;  // features, for two images to be the same
+constexpr double kFeigned = 3.0;            // standard deviations of the cameras' calibration that feign a turn
+constexpr double kOldImage = 0.5;           // [s] after which frames have little in common
+constexpr double kNoisy = 1.25;             // times the usual standard deviation of a feature: less may be chance
+constexpr double kNegligible = 1e-4;  // see FeatureInformation: in all 2e-4 of what a frame tells, in 12 % of the rows
+constexpr int kFeed = 10;             // features used, that tell enough of where the vehicle is
+constexpr double kStarved = 0.6;      // [s] so long it may do without
 constexpr std::size_t kMinObservations = 2;  // clones that must have seen a feature
 
 }  // namespace
@@ -122,6 +123,7 @@ void Filter::use_image(const FeatureFrame& frame, bool still) {
     const std::optional<std::size_t> leaving = clone_to_leave();
     update_with_features(frame, leaving);
     make_room(leaving);
+    while (state_.clones.size() > window_) make_room(0);  // the window has become smaller
   }
   statistics_.clones = static_cast<int>(state_.clones.size());
 }
@@ -141,6 +143,7 @@ void Filter::go_on_blind(bool still) {
 
 /// The vehicle is where it was at the newest clone, and its velocity is zero. docs/filter.md, section 4.
 void Filter::hold_still() {
+  fed_ns_ = state_.imu.t_ns;
   statistics_.standing = true;
   const StandstillConfig& still = config_.standstill;
   const ImuState& x = state_.imu;
@@ -180,6 +183,7 @@ void Filter::append_clone() {
 
 void Filter::make_room(std::optional<std::size_t> leaving) {
   if (!leaving) return;
+  if (*leaving == 0) fed_ns_ = state_.imu.t_ns;  // with all that reached back to it
   tracks_.forget_frame(state_.clones[*leaving].frame);
   covariance_.remove(err::clone(static_cast<int>(*leaving)), err::clone_size);
   state_.clones.erase(state_.clones.begin() + static_cast<std::ptrdiff_t>(*leaving));
@@ -197,14 +201,22 @@ void Filter::update_with_features(const FeatureFrame& frame, std::optional<std::
     ++(add_track(tracks_[i]) ? statistics_.features_used : statistics_.features_rejected);
     tracks_[i].observations.clear();  // each observation is used once
   }
+  note_features_used();
   log_features();
-  information_.compress();
+  information_.compress(kNegligible);
   if (information_.residual().size() > 0) update(information_.H(), err::camera, information_.residual(), true);
 
   // Features that ended, used or not, are forgotten.
   tracks_.keep_if([&](const Track& track) {
     return !track.observations.empty() && std::binary_search(frame_ids_.begin(), frame_ids_.end(), track.id);
   });
+}
+
+void Filter::note_features_used() {
+  fed_features_ += statistics_.features_used;
+  if (fed_features_ < kFeed) return;
+  fed_features_ = 0;
+  fed_ns_ = state_.imu.t_ns;
 }
 
 /// What both cameras saw of this frame's features, against where they were found to be.
@@ -275,39 +287,23 @@ void Filter::add_observation(int clone, std::size_t camera, const InverseDepthPo
 /// With a full window, the clone before the newest goes if it shows little that its elder does not; else the oldest.
 /// Turning on the spot thus fills no window with copies. Where all of the window shows one place, as while a vehicle
 /// shakes on its legs, there is nothing to keep, and the oldest goes: tracks are only used when they end or it leaves.
+/// Neither may happen for long where a vehicle sways to and fro and sees the same all the time: then the oldest goes
+/// too.
 std::optional<std::size_t> Filter::clone_to_leave() const {
   const std::size_t n = state_.clones.size();
-  if (n <= static_cast<std::size_t>(config_.window)) return std::nullopt;
+  if (n <= window_) return std::nullopt;
   const auto same_place = [&](const Clone& a, const Clone& b) {
     return median_parallax_px(a, b) < config_.keyframe_parallax_px;
   };
   const bool copy = same_place(state_.clones[n - 3], state_.clones[n - 2]);
-  return copy && !same_place(state_.clones.front(), state_.clones.back()) ? n - 2 : 0;
+  const bool starved = seconds_between(fed_ns_, state_.imu.t_ns) > kStarved;
+  return copy && !starved && !same_place(state_.clones.front(), state_.clones.back()) ? n - 2 : 0;
 }
 
-/// Median over the common features of how far they moved, the rotation taken out [px]. Infinite where they are few: a
-/// clone that most of today's features never saw is no elder of theirs, however little the vehicle moved.
 double Filter::median_parallax_px(const Clone& from, const Clone& to) const {
-  const Eigen::Matrix3d R_C0B = state_.camera.T_BC0.R.transpose();
-  const Eigen::Matrix3d R_to_from = R_C0B * to.T_WB.R.transpose() * from.T_WB.R * R_C0B.transpose();
-  parallax_.clear();
-  std::size_t seen = 0;  // features in `to`
-  for (const Track& track : tracks_) {
-    const TrackObservation* a = nullptr;
-    const TrackObservation* b = nullptr;
-    for (const TrackObservation& o : track.observations) {
-      if (o.frame == from.frame) a = &o;
-      if (o.frame == to.frame) b = &o;
-    }
-    seen += b != nullptr ? 1 : 0;
-    if (a == nullptr || b == nullptr) continue;
-    const Eigen::Vector3d turned = R_to_from * a->left.homogeneous();
-    parallax_.push_back(focal_px_ * (b->left - turned.hnormalized()).norm());
-  }
-  if (static_cast<double>(parallax_.size()) < kCommonShare * static_cast<double>(seen) || parallax_.empty()) {
-    return std::numeric_limits<double>::infinity();
-  }
-  return upper_median(parallax_);
+  const Eigen::Matrix3d& R_BC0 = state_.camera.T_BC0.R;
+  return focal_px_ *
+         median_parallax(tracks_, {from.frame, from.T_WB.R * R_BC0}, {to.frame, to.T_WB.R * R_BC0}, parallax_);
 }
 
 int Filter::clone_index(std::uint64_t frame) const {

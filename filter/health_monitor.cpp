@@ -233,7 +233,7 @@ void HealthMonitor::judge_cameras(const Frame& frame) {
   ++frames_counted_;
   carrying_.add(blind || (known && seen.left > kManyOff), t_ns);
   trust(Source::camera_left).add(poor || (known && seen.left > kSomeOff), t_ns);
-  if (cameras_ == 2) {
+  if (cameras_ == 2 && frame.right) {
     const bool one_eyed = frame.statistics.stereo < kFewStereo * tracks;
     trust(Source::camera_right).add(poor || one_eyed || (known && seen.right > kSomeOff), t_ns);
   }

@@ -80,6 +80,7 @@ class HealthMonitor {
   struct Frame {
     TimeNs t_ns = 0;       ///< IMU time
     bool image = true;     ///< false: the estimator moved on without one
+    bool right = true;     ///< false: nobody looked at that of the second camera
     bool running = false;  ///< there is a state
     bool possible = true;  ///< and it and its covariance are numbers, variances not negative
     bool lifted = false;   ///< the vehicle just left the ground or met it, whatever is known of its contact

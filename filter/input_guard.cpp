@@ -146,6 +146,7 @@ const FeatureFrame& InputGuard::sound(const FeatureFrame& frame) {
   if (!twice && std::all_of(frame.features.begin(), frame.features.end(), possible)) return frame;
 
   sound_frame_.t_ns = frame.t_ns;
+  sound_frame_.right_skipped = frame.right_skipped;
   sound_frame_.features.clear();
   const auto copies = [this](std::uint64_t id) {
     const auto range = std::equal_range(ids_.begin(), ids_.end(), id);

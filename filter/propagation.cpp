@@ -50,9 +50,13 @@ ErrorTransition error_transition(const ImuState& x, const Eigen::Vector3d& gyro_
 }
 
 void chain(ErrorTransition& total, const ErrorTransition& step) {
-  const ImuErrorMatrix PhiQ = step.Phi * total.Q;
-  total.Q = PhiQ * step.Phi.transpose() + step.Q;
-  total.Phi = (step.Phi * total.Phi).eval();
+  carry_columns(step.Phi, total.Q);
+  total.Q.transposeInPlace();
+  carry_columns(step.Phi, total.Q);
+  total.Q += step.Q;
+  total.Phi.transposeInPlace();
+  carry_columns(step.Phi, total.Phi);
+  total.Phi.transposeInPlace();
 }
 
 }  // namespace ear

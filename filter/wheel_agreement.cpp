@@ -5,14 +5,24 @@
 namespace ear {
 namespace {
 
-constexpr double kMemory = 0.05;  // [s] over which the gyroscope's noise is averaged
-constexpr double kSlack = 0.02;   // [m/s] the ground's shape under two wheels, without any slip
+constexpr double kMemory = 0.05;    // [s] over which the gyroscope's noise is averaged
+constexpr double kSlack = 0.02;     // [m/s] the ground's shape under two wheels, without any slip
+constexpr double kSlipEnds = 0.15;  // [s] of agreement before a row that failed its gate is used again
 constexpr double kSigmas = 3.0;
 constexpr double kPause = 0.1;    // [s]
 constexpr double kReturn = 0.15;  // [s] without contradiction
 constexpr double kCloser = 0.5;   // the share of the limit that counts as agreement again
 
 }  // namespace
+
+bool agrees_again(TimeNs& since_ns, bool passes, TimeNs t_ns) {
+  if (!passes) {
+    since_ns = kDisagrees;
+    return false;
+  }
+  if (since_ns == kDisagrees) since_ns = t_ns;
+  return seconds_between(since_ns, t_ns) >= kSlipEnds;
+}
 
 void WheelAgreement::add(double difference, double sigma, TimeNs t_ns) {
   const double dt = any_ ? seconds_between(last_ns_, t_ns) : 0.0;

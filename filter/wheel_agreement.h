@@ -6,6 +6,13 @@
 
 namespace ear {
 
+/// In place of the time since when something agrees.
+inline constexpr TimeNs kDisagrees = -1;
+
+/// A wheel that slips comes back through the speeds that a gate lets pass: it must have agreed for 0.15 s. `since_ns`
+/// is kept between calls, 0 at the start; `passes`: does what came at t_ns agree?
+[[nodiscard]] bool agrees_again(TimeNs& since_ns, bool passes, TimeNs t_ns);
+
 class WheelAgreement {
  public:
   /// `difference`: right wheel's speed less the left's, less what the gyroscope's yaw rate makes of it [m/s]; `sigma`:

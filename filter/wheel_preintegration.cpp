@@ -121,14 +121,16 @@ void WheelPreintegration::add_interval(const Eigen::Vector3d& gyro_B, double dt,
   G.block<3, 1>(kAlpha, kSeparation) = heading.f * advance.J_climb * climb;
   G.block<3, 3>(kAlpha, kAxle) =
       J_alpha_f * heading.J_axle * R_half + dt * J_distance_turn.sum() * heading.f * rate.transpose();
-  J_ = (F * J_ + G).eval();
+  J_ = (F.lazyProduct(J_) + G).eval();
 
   // White noise of density s has the variance s^2 / dt in a mean over dt; it enters where the bias would.
   const Eigen::Matrix<double, kErrors, 3> by_gyro = G.middleCols<3>(kBias);
   const double path = 0.5 * rolled.cwiseAbs().sum();
   const Eigen::Vector3d left = n_Bi_.cross(heading.f);
   const auto squared = [](double value) { return value * value; };
-  Q_ = (F * Q_ * F.transpose() + squared(gyro_factor * noise_.gyro) / dt * by_gyro * by_gyro.transpose()).eval();
+  const Eigen::Matrix<double, kErrors, kErrors> FQ = F.lazyProduct(Q_);
+  Q_ = FQ.lazyProduct(F.transpose());
+  Q_ += squared(gyro_factor * noise_.gyro) / dt * by_gyro.lazyProduct(by_gyro.transpose());
   Q_.block<3, 3>(kAlpha, kAlpha) += path * (squared(noise_.slip) * heading.f * heading.f.transpose() +
                                             squared(noise_.side_slip) * left * left.transpose() +
                                             squared(noise_.roughness) * n_Bi_ * n_Bi_.transpose());

@@ -78,6 +78,10 @@ class Frontend::Impl {
 
   const FeatureFrame& process(const StereoFrame& frame, const MotionPrediction& prediction);
   void reset();
+  void set_limits(int max_features, bool use_right) {
+    max_features_ = static_cast<std::size_t>(std::clamp(max_features, 1, config_.max_features));
+    use_right_ = use_right;
+  }
 
   ImageQuality quality;
   FrontendTiming timing;
@@ -106,6 +110,8 @@ class Frontend::Impl {
 
   ImagePyramid left_;
   ImagePyramid right_;
+  std::size_t max_features_ = 0;  // for now
+  bool use_right_ = true;
   bool right_present_ = false;
   MotionGuess motion_;  // of the left camera, last frame to this one
   std::vector<Track> tracks_;
@@ -126,6 +132,7 @@ Frontend::Impl::Impl(const FrontendConfig& config, std::vector<CameraCalibration
   if (!(config_.nearest_depth > 0.0)) throw std::invalid_argument("frontend: nearest_depth must be positive");
   if (cameras_.size() > 1) stereo_.emplace(cameras_[0], cameras_[1], config_.nearest_depth);
   patches_.resize(static_cast<std::size_t>(config_.max_features));
+  set_limits(config_.max_features, true);
   reset();
 }
 
@@ -139,6 +146,8 @@ const FeatureFrame& Frontend::Impl::process(const StereoFrame& frame, const Moti
   check_size(frame.left, cameras_.front(), "left");
   right_present_ = stereo_ && !frame.right.empty();
   if (right_present_) check_size(frame.right, cameras_[1], "right");
+  output_.right_skipped = right_present_ && !use_right_;
+  right_present_ = right_present_ && use_right_;
 
   if (left_.shows(frame.left)) {  // no two exposures are equal: it tells nothing, and the filter will see that
     timing = {};
@@ -182,6 +191,11 @@ MotionGuess Frontend::Impl::camera_motion(const MotionPrediction& prediction) co
 
 void Frontend::Impl::track(const MotionPrediction& prediction) {
   previous_ = tracks_;
+  if (tracks_.size() > max_features_) {  // there were more: older ones come first
+    std::vector<std::uint8_t> oldest(tracks_.size(), 0);
+    std::fill_n(oldest.begin(), max_features_, std::uint8_t{1});
+    drop(oldest);
+  }
   std::vector<std::uint8_t> keep(tracks_.size(), 0);
   motion_ = track_probes(camera_motion(prediction), keep);
   const int known = motion_.rotation_known ? kLevelPredicted : kLevelUnknown;
@@ -296,7 +310,7 @@ void Frontend::Impl::refresh_patches() {
 }
 
 void Frontend::Impl::detect() {
-  const int wanted = config_.max_features - static_cast<int>(tracks_.size());
+  const int wanted = static_cast<int>(max_features_) - static_cast<int>(tracks_.size());
   const std::vector<Corner> corners = detector_.detect(left_, pixels(), wanted);
   quality.detected = 0;
   for (const Corner& corner : corners) {
@@ -359,6 +373,7 @@ const FeatureFrame& Frontend::process(const StereoFrame& frame, const MotionPred
 }
 const ImageQuality& Frontend::quality() const { return impl_->quality; }
 const FrontendTiming& Frontend::timing() const { return impl_->timing; }
+void Frontend::set_limits(int max_features, bool use_right) { impl_->set_limits(max_features, use_right); }
 void Frontend::reset() { impl_->reset(); }
 
 }  // namespace ear

@@ -53,6 +53,10 @@ class Frontend {
   [[nodiscard]] const ImageQuality& quality() const;
   [[nodiscard]] const FrontendTiming& timing() const;
 
+  /// From the next frame on: so many tracks at a time, up to FrontendConfig::max_features, and whether the right image
+  /// is looked at. Of too many tracks the youngest end.
+  void set_limits(int max_features, bool use_right);
+
   /// Forgets all tracks; ids go on counting.
   void reset();
 

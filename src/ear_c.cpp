@@ -130,6 +130,7 @@ ear::Config config_of(const ear_settings& from) {
   config.filter.odometer.model = choice<ear::OdometerModel>(from.odometer, 4, "odometer");
   config.filter.impact.accel_range = from.accel_range;
   config.filter.impact.gyro_range = from.gyro_range;
+  config.performance.budget_ms = from.budget_ms;
   return config;
 }
 
@@ -183,6 +184,7 @@ void write_health(const ear::Health& from, ear_health& to) {
   to.horizontal_sigma = from.horizontal_sigma;
   to.vertical_sigma = from.vertical_sigma;
   to.reset_counter = from.reset_counter;
+  to.load_step = from.load_step;
 }
 
 ear_result result_of(bool queued) { return queued ? EAR_OK : EAR_QUEUE_FULL; }
@@ -252,6 +254,7 @@ void ear_default_settings(ear_settings* settings) {
   settings->odometer = static_cast<ear_odometer_model>(config.filter.odometer.model);
   settings->accel_range = config.filter.impact.accel_range;
   settings->gyro_range = config.filter.impact.gyro_range;
+  settings->budget_ms = config.performance.budget_ms;
   settings->queue_seconds = capacity.seconds;
   settings->frame_slots = static_cast<std::int32_t>(capacity.frame_slots);
 }
@@ -332,6 +335,16 @@ ear_result ear_predict(const ear_odometry* odometry, int64_t t_ns, ear_state* st
   return guarded([&] {
     if (odometry == nullptr || state == nullptr) return EAR_INVALID_ARGUMENT;
     const std::optional<ear::NavState> answer = odometry->queued.odometry().predict(t_ns);
+    if (!answer) return EAR_NO_ESTIMATE;
+    write_state(*answer, *state);
+    return EAR_OK;
+  });
+}
+
+ear_result ear_live_state(const ear_odometry* odometry, ear_state* state) {
+  return guarded([&] {
+    if (odometry == nullptr || state == nullptr) return EAR_INVALID_ARGUMENT;
+    const std::optional<ear::NavState> answer = odometry->queued.live();
     if (!answer) return EAR_NO_ESTIMATE;
     write_state(*answer, *state);
     return EAR_OK;

@@ -37,6 +37,7 @@ std::string to_text(HealthStatus status) {
 
 std::string to_text(const Health& health) {
   std::string text = to_text(health.status);
+  if (health.load_step > 0) text += ", load step " + std::to_string(health.load_step);
   if (health.status != HealthStatus::degraded) return text;
   const char* separator = ": without ";
   for (std::size_t source = 0; source < kSourceCount; ++source) {

@@ -3,10 +3,13 @@
 
 #include <chrono>
 #include <exception>
+#include <stdexcept>
+#include <utility>
 
 #include "filter/filter.h"
 #include "filter/stamp_guard.h"
 #include "frontend/frontend.h"
+#include "src/load_governor.h"
 
 namespace ear {
 namespace {
@@ -23,22 +26,34 @@ MotionPrediction to_prediction(const std::optional<RelativeMotion>& motion) {
   return prediction;
 }
 
+double machine_time() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
 }  // namespace
 
 class Odometry::Impl {
  public:
-  Impl(const Config& config, const Calibration& calibration)
-      : config_(config), calibration_(calibration), filter_(config.filter, calibration) {
+  Impl(const Config& config, const Calibration& calibration, MakeEstimator make, Clock clock)
+      : config_(config),
+        calibration_(calibration),
+        clock_(std::move(clock)),
+        make_(std::move(make)),
+        estimator_(make_(config.filter, calibration)),
+        load_(1e-3 * config.performance.budget_ms, {config.frontend.max_features, config.filter.window, 1, 1}) {
+    if (!(config.performance.budget_ms >= 0.0)) {
+      throw std::invalid_argument("performance.budget_ms: a time, or 0 for no limit");
+    }
     if (!calibration.cameras.empty()) frontend_.emplace(config.frontend, calibration.cameras);
   }
 
-  void add_imu(const ImuSample& sample) { filter_.add_imu(sample); }
-  void add_encoder(const EncoderSample& sample) { filter_.add_encoder(sample); }
-  void add_laser(const LaserSample& sample) { filter_.add_laser(sample); }
+  void add_imu(const ImuSample& sample) { estimator_->add_imu(sample); }
+  void add_encoder(const EncoderSample& sample) { estimator_->add_encoder(sample); }
+  void add_laser(const LaserSample& sample) { estimator_->add_laser(sample); }
 
   std::optional<Estimate> add_stereo(const StereoFrame& given) {
     stage_times_ = StageTimes{};
-    const std::optional<TimeNs> stamp_ns = filter_.common_stamp(given.t_ns);
+    const std::optional<TimeNs> stamp_ns = estimator_->common_stamp(given.t_ns);
     if (!stamp_ns) {
       ++camera_.far_ahead;
       return std::nullopt;
@@ -46,18 +61,23 @@ class Odometry::Impl {
     StereoFrame frame = given;
     frame.t_ns = *stamp_ns;
     if (!accepts(frame.t_ns, camera_)) {
-      if (is_time(frame.t_ns) && filter_.is_next(frame.t_ns)) filter_.refuse_frame();
+      if (is_time(frame.t_ns) && estimator_->is_next(frame.t_ns)) estimator_->refuse_frame();
       return std::nullopt;
     }
+    if (!takes_turn()) {
+      note_frame(frame.t_ns);
+      return std::nullopt;
+    }
+    const double start = clock_();
     const FeatureFrame* const features = track(frame);
     if (features == nullptr) {
       ++camera_.implausible;
       return std::nullopt;
     }
-    if (last_frame_ns_ && seconds_between(*last_frame_ns_, frame.t_ns) > kFrameGap) ++camera_.gaps;
-    last_frame_ns_ = frame.t_ns;
-    ++camera_.accepted;
-    return update(*features);
+    note_frame(frame.t_ns);
+    std::optional<Estimate> estimate = update(*features);
+    load_.add(clock_() - start);
+    return estimate;
   }
 
   std::optional<Estimate> step(TimeNs t_ns) {
@@ -67,15 +87,15 @@ class Odometry::Impl {
       ++steps_.implausible;
       return std::nullopt;
     }
-    nothing.t_ns = filter_.camera_time(t_ns);
+    nothing.t_ns = estimator_->camera_time(t_ns);
     return accepts(nothing.t_ns, steps_) ? update(nothing) : std::nullopt;
   }
 
-  [[nodiscard]] const Filter& filter() const { return filter_; }
+  [[nodiscard]] const Estimator& estimator() const { return *estimator_; }
   [[nodiscard]] const StageTimes& stage_times() const { return stage_times_; }
 
   [[nodiscard]] InputCounts input_counts() const {
-    InputCounts counts = filter_.input_counts();
+    InputCounts counts = estimator_->input_counts();
     counts.camera = camera_;
     counts.steps_rejected = steps_.rejected();
     return counts;
@@ -83,7 +103,7 @@ class Odometry::Impl {
 
   [[nodiscard]] Calibration calibration() const {
     Calibration learned = calibration_;
-    const CameraState& camera = filter_.state().camera;
+    const CameraState camera = estimator_->cameras();
     const auto isometry = [](const Pose& T) {
       Eigen::Isometry3d result = Eigen::Isometry3d::Identity();
       result.linear() = T.R;
@@ -93,7 +113,7 @@ class Odometry::Impl {
     if (!learned.cameras.empty()) learned.cameras.front().T_BC = isometry(camera.T_BC0);
     if (learned.cameras.size() == 2) learned.cameras[1].T_BC = isometry(camera.T_BC0) * isometry(camera.T_C0C1);
     learned.camera_time_offset = camera.time_offset;
-    const OdometerState& odometer = filter_.state().odometer;
+    const OdometerState odometer = estimator_->odometer();
     if (learned.encoder) {
       learned.encoder->wheel_radius = {odometer.wheel_radius(0), odometer.wheel_radius(1)};
       learned.encoder->wheel_separation = odometer.wheel_separation;
@@ -105,7 +125,13 @@ class Odometry::Impl {
     return learned;
   }
 
-  [[nodiscard]] Impl fresh() const { return Impl(config_, calibration_); }
+  [[nodiscard]] Impl fresh() const { return Impl(config_, calibration_, make_, clock_); }
+
+  [[nodiscard]] Health health() const {
+    Health health = estimator_->health();
+    health.load_step = load_.step();
+    return health;
+  }
 
  private:
   /// Is a frame with this stamp later than the one before, and are its inertial samples there? Counts those that are
@@ -113,9 +139,9 @@ class Odometry::Impl {
   bool accepts(TimeNs t_ns, StreamCounts& counts) const {
     if (!is_time(t_ns)) {
       ++counts.implausible;
-    } else if (!filter_.is_next(t_ns)) {
+    } else if (!estimator_->is_next(t_ns)) {
       ++counts.not_later;
-    } else if (!filter_.covers(t_ns)) {
+    } else if (!estimator_->covers(t_ns)) {
       ++counts.far_ahead;
     } else {
       return true;
@@ -123,17 +149,40 @@ class Odometry::Impl {
     return false;
   }
 
+  /// Whether this frame is used at all, and how much of it: as the budget allows.
+  bool takes_turn() {
+    const LoadLimits limits = load_.limits();
+    if (++frames_left_out_ < limits.frame_every) {
+      load_.add(0.0);
+      return false;
+    }
+    frames_left_out_ = 0;
+    const bool use_right = ++frames_without_right_ >= limits.stereo_every;
+    if (use_right) frames_without_right_ = 0;
+    if (frontend_) frontend_->set_limits(limits.max_features, use_right);
+    estimator_->set_window(limits.window);
+    return true;
+  }
+
+  void note_frame(TimeNs t_ns) {
+    if (last_frame_ns_ && seconds_between(*last_frame_ns_, t_ns) > kFrameGap) ++camera_.gaps;
+    last_frame_ns_ = t_ns;
+    ++camera_.accepted;
+  }
+
   std::optional<Estimate> update(const FeatureFrame& features) {
     const auto start = std::chrono::steady_clock::now();
-    std::optional<Estimate> estimate = filter_.process(features);
+    std::optional<Estimate> estimate = estimator_->process(features);
     stage_times_.filter = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    if (estimate) estimate->health.load_step = load_.step();
     return estimate;
   }
 
   /// The frame's features; nothing if its images do not fit the calibration.
   const FeatureFrame* track(const StereoFrame& frame) {
     if (!frontend_) return nullptr;
-    const MotionPrediction prediction = to_prediction(filter_.motion_to(frame.t_ns));
+    MotionPrediction prediction;
+    if (config_.frontend.motion_prediction) prediction = to_prediction(estimator_->motion_to(frame.t_ns));
     try {
       const FeatureFrame& features = frontend_->process(frame, prediction);
       const FrontendTiming& timing = frontend_->timing();
@@ -150,16 +199,27 @@ class Odometry::Impl {
 
   Config config_;
   Calibration calibration_;
-  Filter filter_;
+  Clock clock_;
+  MakeEstimator make_;
+  std::unique_ptr<Estimator> estimator_;
   std::optional<Frontend> frontend_;  ///< with a camera
+  LoadGovernor load_;
+  int frames_left_out_ = 0;       ///< in a row
+  int frames_without_right_ = 0;  ///< frames used in a row whose right image was not
   StageTimes stage_times_;
   StreamCounts camera_;
   StreamCounts steps_;
   std::optional<TimeNs> last_frame_ns_;
 };
 
-Odometry::Odometry(const Config& config, const Calibration& calibration)
-    : impl_(std::make_unique<Impl>(config, calibration)) {}
+Odometry::Odometry(const Config& config, const Calibration& calibration, Clock clock)
+    : Odometry(
+          config, calibration,
+          [](const FilterConfig& filter, const Calibration& given) { return std::make_unique<Filter>(filter, given); },
+          std::move(clock)) {}
+Odometry::Odometry(const Config& config, const Calibration& calibration, MakeEstimator make, Clock clock)
+    : impl_(std::make_unique<Impl>(config, calibration, std::move(make),
+                                   clock ? std::move(clock) : Clock(machine_time))) {}
 Odometry::~Odometry() = default;
 Odometry::Odometry(Odometry&&) noexcept = default;
 Odometry& Odometry::operator=(Odometry&&) noexcept = default;
@@ -169,9 +229,9 @@ void Odometry::add_encoder(const EncoderSample& sample) { impl_->add_encoder(sam
 void Odometry::add_laser(const LaserSample& sample) { impl_->add_laser(sample); }
 std::optional<Estimate> Odometry::step(TimeNs t_ns) { return impl_->step(t_ns); }
 std::optional<Estimate> Odometry::add_stereo(const StereoFrame& frame) { return impl_->add_stereo(frame); }
-std::optional<NavState> Odometry::predict(TimeNs t_ns) const { return impl_->filter().predict(t_ns); }
-Status Odometry::status() const { return impl_->filter().status(); }
-Health Odometry::health() const { return impl_->filter().health(); }
+std::optional<NavState> Odometry::predict(TimeNs t_ns) const { return impl_->estimator().predict(t_ns); }
+Status Odometry::status() const { return impl_->estimator().status(); }
+Health Odometry::health() const { return impl_->health(); }
 InputCounts Odometry::input_counts() const { return impl_->input_counts(); }
 StageTimes Odometry::stage_times() const { return impl_->stage_times(); }
 Calibration Odometry::calibration() const { return impl_->calibration(); }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 
 namespace ear {
 namespace {
@@ -57,8 +58,10 @@ ImageView view_of_rows(const std::vector<std::uint8_t>& rows, const CameraCalibr
 
 }  // namespace
 
-QueuedOdometry::QueuedOdometry(const Config& config, const Calibration& calibration, const QueueCapacity& capacity)
-    : odometry_(config, checked(calibration, capacity)),
+QueuedOdometry::QueuedOdometry(const Config& config, const Calibration& calibration, const QueueCapacity& capacity,
+                               Clock clock)
+    : odometry_(config, checked(calibration, capacity), std::move(clock)),
+      drops_frames_(config.performance.budget_ms > 0.0),
       cameras_(calibration.cameras),
       camera_offset_ns_(std::llround(1e9 * calibration.camera_time_offset)),
       imu_(elements(capacity.seconds, calibration.imu.rate_hz), {}),
@@ -66,7 +69,8 @@ QueuedOdometry::QueuedOdometry(const Config& config, const Calibration& calibrat
       laser_(calibration.lasers ? elements(capacity.seconds, calibration.lasers->rate_hz) : 0, {}),
       frames_(calibration.cameras.empty() ? 0 : capacity.frame_slots,
               {0, std::vector<std::uint8_t>(pixels(calibration, 0)), std::vector<std::uint8_t>(pixels(calibration, 1)),
-               false}) {
+               false}),
+      live_(imu_.queue.capacity()) {
   if (calibration.lasers) laser_sample_.range.resize(calibration.lasers->beams.size());
 }
 
@@ -119,7 +123,19 @@ void QueuedOdometry::hand_over(TimeNs until_ns) {
   }
 }
 
+/// So that no inertial samples are lost because a frame takes too long.
+void QueuedOdometry::drop_old_frames() {
+  while (2 * imu_.queue.size() > imu_.queue.capacity() && frames_.queue.size() > 1) {
+    frames_.queue.pop();
+    frames_.overflows.fetch_add(1, std::memory_order_relaxed);
+    hand_over(frames_.queue.front()->t_ns + camera_offset_ns_);
+  }
+}
+
+void QueuedOdometry::tell_state() { live_.tell(odometry_.predict(newest_imu_ns_), newest_imu_ns_); }
+
 Progress QueuedOdometry::process(std::optional<Estimate>& estimate) {
+  if (drops_frames_) drop_old_frames();
   const Frame* const frame = frames_.queue.front();
   if (frame == nullptr) {
     hand_over(std::numeric_limits<TimeNs>::max());
@@ -130,12 +146,15 @@ Progress QueuedOdometry::process(std::optional<Estimate>& estimate) {
   if (newest_imu_ns_ < frame_ns && !frames_.queue.full()) return Progress::no_frame;
   estimate = odometry_.add_stereo(view_of(*frame));
   frames_.queue.pop();
+  tell_state();
   return estimate ? Progress::estimated : Progress::taken;
 }
 
 std::optional<Estimate> QueuedOdometry::step(TimeNs t_ns) {
   hand_over(t_ns);
-  return odometry_.step(t_ns);
+  std::optional<Estimate> estimate = odometry_.step(t_ns);
+  tell_state();
+  return estimate;
 }
 
 void QueuedOdometry::reset() {
@@ -148,6 +167,7 @@ void QueuedOdometry::reset() {
   drop_all(frames_);
   newest_imu_ns_ = std::numeric_limits<TimeNs>::min();
   odometry_.reset();
+  live_.tell(std::nullopt, 0);
 }
 
 Overflows QueuedOdometry::overflows() const {

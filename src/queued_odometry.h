@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "ear/odometry.h"
+#include "src/live_state.h"
 #include "src/sample_queue.h"
 
 namespace ear {
@@ -19,7 +20,8 @@ struct QueueCapacity {
   std::size_t frame_slots = 4;  ///< stereo frames
 };
 
-/// Samples that were refused because their queue was full.
+/// Samples that were refused because their queue was full; frames also that were dropped because the thread that
+/// estimates was too far behind.
 struct Overflows {
   std::uint64_t imu = 0, encoder = 0, laser = 0, frames = 0;
 };
@@ -41,18 +43,26 @@ class QueuedOdometry {
     std::array<double, kMaxBeams> range{};
   };
 
-  /// Throws std::invalid_argument, naming the field.
-  QueuedOdometry(const Config& config, const Calibration& calibration, const QueueCapacity& capacity);
+  /// Throws std::invalid_argument, naming the field. `clock` as for Odometry.
+  QueuedOdometry(const Config& config, const Calibration& calibration, const QueueCapacity& capacity, Clock clock = {});
 
   /// Each by one thread. False: the queue is full; the sample is counted.
-  bool add_imu(const ImuSample& sample) { return add(imu_, sample); }
+  bool add_imu(const ImuSample& sample) {
+    live_.add(sample);
+    return add(imu_, sample);
+  }
   bool add_encoder(const EncoderSample& sample) { return add(encoder_, sample); }
   bool add_laser(const Ranges& ranges) { return add(laser_, ranges); }
   /// Copies the images, which have the size in the calibration.
   bool add_stereo(const StereoFrame& frame);
 
+  /// The newest state, carried on to the newest inertial sample, by the thread that adds these: it waits for nobody.
+  [[nodiscard]] std::optional<NavState> live() const { return live_.state(); }
+
   /// All that follows belongs to the thread that estimates. Hands over what waits, ordered by time, up to the oldest
-  /// frame, and that frame once inertial samples reach it or all slots are taken.
+  /// frame, and that frame once inertial samples reach it or all slots are taken. With a budget
+  /// (PerformanceConfig::budget_ms), frames but the newest are dropped while more than half of the inertial samples'
+  /// queue waits.
   Progress process(std::optional<Estimate>& estimate);
   std::optional<Estimate> step(TimeNs t_ns);
   void reset();
@@ -89,9 +99,12 @@ class QueuedOdometry {
   }
 
   [[nodiscard]] StereoFrame view_of(const Frame& frame) const;
+  void drop_old_frames();
   void hand_over(TimeNs until_ns);
+  void tell_state();
 
   Odometry odometry_;
+  bool drops_frames_;
   std::vector<CameraCalibration> cameras_;
   TimeNs camera_offset_ns_;  ///< added to a camera's stamp gives IMU time
   Inlet<ImuSample> imu_;
@@ -100,6 +113,7 @@ class QueuedOdometry {
   Inlet<Frame> frames_;
   LaserSample laser_sample_;  ///< reused
   TimeNs newest_imu_ns_ = std::numeric_limits<TimeNs>::min();
+  LiveState live_;
 };
 
 }  // namespace ear

@@ -29,7 +29,13 @@ class SampleQueue {
   }
   void pop() { begin_.store(after(begin_.load(std::memory_order_relaxed)), std::memory_order_release); }
 
-  /// Seen from the thread that takes out.
+  /// Seen from the thread that takes out, as is the next.
+  [[nodiscard]] std::size_t size() const {
+    const std::size_t begin = begin_.load(std::memory_order_relaxed);
+    const std::size_t end = end_.load(std::memory_order_acquire);
+    return end >= begin ? end - begin : end + slots_.size() - begin;
+  }
+  [[nodiscard]] std::size_t capacity() const { return slots_.size() - 1; }
   [[nodiscard]] bool full() const {
     return after(end_.load(std::memory_order_acquire)) == begin_.load(std::memory_order_relaxed);
   }

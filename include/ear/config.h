@@ -3,12 +3,14 @@
 
 #include "ear/filter_config.h"
 #include "ear/frontend_config.h"
+#include "ear/performance_config.h"
 
 namespace ear {
 
 struct Config {
   FrontendConfig frontend;
   FilterConfig filter;
+  PerformanceConfig performance;
 };
 
 }  // namespace ear

@@ -103,6 +103,7 @@ typedef struct {
   double gyro_range;    /* [rad/s] */
   double queue_seconds; /* [s] of samples that each queue holds, at the rates of the calibration */
   int32_t frame_slots;  /* frames that wait for the consumer; their images are kept in memory */
+  double budget_ms;     /* that a frame may cost in the mean before work is left out; 0: as much as it takes */
 } ear_settings;
 
 void ear_default_settings(ear_settings* settings);
@@ -181,8 +182,8 @@ typedef struct {
 } ear_estimate;
 
 /* Hands the waiting samples to the estimator, ordered by time, and then the oldest frame, once inertial samples reach
- * its time or all slots are taken. EAR_OK: *estimate is that frame's. Call it until it says EAR_NOTHING; it never
- * waits. */
+ * its time or all slots are taken. EAR_OK: *estimate is that frame's. EAR_NO_ESTIMATE: before the start, and of a frame
+ * that is left out to keep ear_settings.budget_ms. Call it until it says EAR_NOTHING; it never waits. */
 ear_result ear_process(ear_odometry* odometry, ear_estimate* estimate);
 
 /* The estimate at a time without an image, from all other sensors: for vehicles without a camera, and while its images
@@ -192,6 +193,11 @@ ear_result ear_step(ear_odometry* odometry, int64_t t_ns, ear_estimate* estimate
 /* The newest state carried on to a time by the inertial samples that ear_process() and ear_step() took, at any rate.
  * EAR_NO_ESTIMATE before the start. */
 ear_result ear_predict(const ear_odometry* odometry, int64_t t_ns, ear_state* state);
+
+/* For the IMU's thread, after ear_add_imu(): the newest state carried on to the newest sample added. It never waits for
+ * the consumer, so that output at the rate of the samples goes on however long a frame takes. EAR_NO_ESTIMATE also when
+ * the consumer took no frame and no step for 2 s. */
+ear_result ear_live_state(const ear_odometry* odometry, ear_state* state);
 
 ear_status ear_status_of(const ear_odometry* odometry);
 
@@ -237,6 +243,7 @@ typedef struct {
   double horizontal_sigma;            /* [m] standard deviation of the position since the start, worst direction */
   double vertical_sigma;              /* [m] */
   uint8_t reset_counter;              /* grows when the pose goes on with a jump: after lost */
+  int32_t load_step;                  /* how much work is left out to keep ear_settings.budget_ms; 0: none */
 } ear_health;
 
 /* At any time, also without an estimate. The consumer's thread. */
@@ -247,7 +254,7 @@ const char* ear_source_text(ear_source source);
 
 /* What was refused since the start; nothing is lost silently. */
 typedef struct {
-  uint64_t imu_overflow, encoder_overflow, laser_overflow, frame_overflow; /* the queue was full */
+  uint64_t imu_overflow, encoder_overflow, laser_overflow, frame_overflow; /* the queue was full, or too full */
   uint64_t imu_rejected, encoder_rejected, laser_rejected;                 /* not finite, out of order, too late */
   uint64_t imu_spikes, imu_gaps, clock_leaps;
   uint64_t frames_rejected, frames_without_imu;

@@ -4,8 +4,9 @@
 namespace ear {
 
 struct FrontendConfig {
-  int max_features = 150;       ///< tracks kept at a time
-  double nearest_depth = 0.15;  ///< [m] closer points are not searched for across the stereo pair
+  int max_features = 150;         ///< tracks kept at a time
+  double nearest_depth = 0.15;    ///< [m] closer points are not searched for across the stereo pair
+  bool motion_prediction = true;  ///< look for features where the state's motion says; else where they were
 };
 
 }  // namespace ear

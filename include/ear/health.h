@@ -67,6 +67,7 @@ struct Health {
   double horizontal_sigma = 0.0;   ///< [m] standard deviation of the position since the start, in the worst direction
   double vertical_sigma = 0.0;     ///< [m]
   std::uint8_t reset_counter = 0;  ///< grows when the pose goes on with a jump: after `lost`
+  int load_step = 0;               ///< how much work is left out to keep PerformanceConfig::budget_ms; 0: none
   std::array<SourceRecord, kSourceCount> sources{};
 };
 

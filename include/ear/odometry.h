@@ -13,6 +13,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 
@@ -129,10 +130,20 @@ struct StageTimes {
   double pyramid = 0.0, track = 0.0, detect = 0.0, stereo = 0.0, reject = 0.0, filter = 0.0;
 };
 
+/// The present time [s], of any origin: what tells how long frames take.
+using Clock = std::function<double()>;
+
+/// What comes behind the front end: the filter, or another to compare it with (filter/estimator.h).
+class Estimator;
+using MakeEstimator = std::function<std::unique_ptr<Estimator>(const FilterConfig&, const Calibration&)>;
+
 class Odometry {
  public:
-  /// Throws std::invalid_argument, naming the field, if the calibration or a setting is unusable.
-  Odometry(const Config& config, const Calibration& calibration);
+  /// Throws std::invalid_argument, naming the field, if the calibration or a setting is unusable. `clock`: where
+  /// PerformanceConfig::budget_ms is measured; by default that of the machine.
+  Odometry(const Config& config, const Calibration& calibration, Clock clock = {});
+  /// With another estimator in place of the filter.
+  Odometry(const Config& config, const Calibration& calibration, MakeEstimator make, Clock clock = {});
   ~Odometry();
   Odometry(Odometry&&) noexcept;
   Odometry& operator=(Odometry&&) noexcept;
@@ -143,7 +154,8 @@ class Odometry {
   void add_laser(const LaserSample& sample);
 
   /// The estimate at the frame's time, or nothing while the estimator cannot start (see status()). Inertial samples up
-  /// to the frame's time should be there; where the last ones are missing, the newest one is held.
+  /// to the frame's time should be there; where the last ones are missing, the newest one is held. Nothing either for a
+  /// frame that is left out to keep PerformanceConfig::budget_ms; predict() goes on.
   std::optional<Estimate> add_stereo(const StereoFrame& frame);
 
   /// The estimate at a time without an image (IMU time), from all other sensors: for vehicles without a camera, and

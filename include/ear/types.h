@@ -63,6 +63,7 @@ struct FeatureObservation {
 struct FeatureFrame {
   TimeNs t_ns = 0;
   std::vector<FeatureObservation> features;
+  bool right_skipped = false;  ///< nobody looked for them in the right image, though there is a second camera
 };
 
 }  // namespace ear

@@ -53,6 +53,12 @@ template <typename C, typename F>
 EnableFor<C, FrontendConfig> visit(C& c, F&& f) {
   f("max_features", c.max_features);
   f("nearest_depth", c.nearest_depth);
+  f("motion_prediction", c.motion_prediction);
+}
+
+template <typename C, typename F>
+EnableFor<C, PerformanceConfig> visit(C& c, F&& f) {
+  f("budget_ms", c.budget_ms);
 }
 
 template <typename C, typename F>
@@ -165,6 +171,7 @@ template <typename C, typename F>
 EnableFor<C, Config> visit(C& c, F&& f) {
   f("frontend", c.frontend);
   f("filter", c.filter);
+  f("performance", c.performance);
 }
 
 }  // namespace ear

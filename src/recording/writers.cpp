@@ -44,7 +44,7 @@ std::string states_heading() {
          ",tracks,stereo,features_used,features_rejected,clones,wheel_rows_used,wheel_rows_rejected,beams_used,"
          "beams_rejected,standing,on_ground,slope_along,slope_across,sigma_slope_along,sigma_slope_across,"
          "weight_imu,weight_odometer,weight_camera,inconsistency_imu,inconsistency_odometer,inconsistency_camera,"
-         "displacement_variance,disagreement,anomalous,mode,health,quality\n";
+         "displacement_variance,disagreement,anomalous,mode,health,quality,load_step\n";
 }
 
 void append(std::string& line, double value) {
@@ -146,7 +146,8 @@ void StatesWriter::write(const Estimate& estimate, std::string health) {
   append(line, consistency.threshold > 0.0 ? consistency.score / consistency.threshold : 0.0);
   line += "," + std::to_string(anomalous_code(consistency)) + "," + mode_text(frame);
   std::replace(health.begin(), health.end(), ',', ';');
-  line += "," + health + "," + std::to_string(estimate.health.quality);
+  line +=
+      "," + health + "," + std::to_string(estimate.health.quality) + "," + std::to_string(estimate.health.load_step);
   out_.write(line + "\n");
 }
 

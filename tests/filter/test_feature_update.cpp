@@ -1,5 +1,6 @@
 #include <doctest/doctest.h>
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <Eigen/QR>
 #include <cmath>
@@ -195,6 +196,33 @@ TEST_CASE("feature: rounding makes up no rows and no residual") {
         (H_x.transpose() * H_x).bottomRightCorner(information.H().cols(), information.H().cols());
     CHECK((information.H().transpose() * information.H() - expected).norm() < 1e-7 * expected.norm());
   }
+}
+
+TEST_CASE("feature: rows left out as negligible take no more than their share, and add nothing") {
+  std::mt19937_64 rng{68};
+  constexpr double kShare = 1e-3;
+  const Scene scene = slow_scene(rng, 12);
+  const Covariance P = some_covariance(rng, scene.x);
+  FeatureInformation information(12, 4);
+  const auto rows = [&](double negligible) -> Eigen::MatrixXd {
+    information.start(scene.x.error_size());
+    REQUIRE(information.add(scene.observations, kSigma, 1e9, P.matrix(), [](int) { return 1e9; }));
+    information.compress(negligible);
+    return information.H();
+  };
+  const Eigen::MatrixXd all = rows(FeatureInformation::kRounding);
+  const Eigen::MatrixXd most = rows(kShare);
+  CHECK(most.rows() < all.rows());
+  CHECK(most.rows() > all.rows() / 4);
+  const Eigen::MatrixXd missing = all.transpose() * all - most.transpose() * most;
+  Eigen::VectorXd known = Eigen::VectorXd::Zero(missing.rows());  // what the features tell, were they known
+  for (const LinearizedObservation& z : scene.observations) {
+    known.head<12>() += z.H_calibration.cwiseAbs2().colwise().sum().transpose() / (kSigma * kSigma);
+    known.segment<6>(err::clone(z.clone) - err::camera) +=
+        z.H_clone.cwiseAbs2().colwise().sum().transpose() / (kSigma * kSigma);
+  }
+  CHECK((missing.diagonal().array() <= kShare * known.array() + 1e-9 * known.maxCoeff()).all());
+  CHECK(Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(missing).eigenvalues()(0) > -1e-9 * known.maxCoeff());
 }
 
 TEST_CASE("feature: an update by two features is that of their stacked rows") {

@@ -8,14 +8,13 @@
 #include <functional>
 #include <limits>
 #include <memory>
-#include <opencv2/core.hpp>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "ear/ear_c.h"
 #include "ear/odometry.h"
-#include "tools/simulator/picture_maker.h"
+#include "tools/simulator/film.h"
 #include "tools/simulator/simulation.h"
 
 namespace ear {
@@ -82,27 +81,18 @@ ear_calibration to_c(const Calibration& from) {
 }
 
 /// A short drive with its pictures, rendered once.
-struct Drive {
-  Simulation simulation;
-  std::vector<std::array<cv::Mat, 2>> pictures;
-
-  Drive() : simulation(options()) {
-    const simulator::PictureMaker maker(simulation);
-    for (const simulator::Frame& frame : simulation.frames()) {
-      pictures.push_back({maker.make({frame.exposure, 0}), maker.make({frame.exposure, 1})});
-    }
-  }
+struct Drive : simulator::Film {
+  Drive() : Film(options()) {}
 
   static simulator::Options options() {
     simulator::Options options;
     options.seed = 11;
     options.duration = 3.5;
     options.camera_rate_hz = 6.0;
-    options.tracks = false;
     return options;
   }
 
-  [[nodiscard]] ear_stereo_frame frame(std::size_t i) const {
+  [[nodiscard]] ear_stereo_frame c_frame(std::size_t i) const {
     return {simulation.frame_times()[i], pictures[i][0].data, pictures[i][1].data,
             static_cast<std::ptrdiff_t>(pictures[i][0].step)};
   }
@@ -143,7 +133,7 @@ struct Drive {
       case SensorStream::camera:
         break;
     }
-    const ear_stereo_frame sample = frame(delivery.index);
+    const ear_stereo_frame sample = c_frame(delivery.index);
     return ear_add_stereo(odometry, &sample);
   }
 
@@ -156,12 +146,7 @@ struct Drive {
       if (delivery.stream == SensorStream::encoder) odometry.add_encoder(simulation.encoders()[delivery.index]);
       if (delivery.stream == SensorStream::laser) odometry.add_laser(simulation.lasers()[delivery.index]);
       if (delivery.stream != SensorStream::camera) continue;
-      const std::array<cv::Mat, 2>& pair = pictures[delivery.index];
-      const auto view = [](const cv::Mat& m) {
-        return ImageView{m.data, m.cols, m.rows, static_cast<std::ptrdiff_t>(m.step)};
-      };
-      const StereoFrame stereo{simulation.frame_times()[delivery.index], view(pair[0]), view(pair[1])};
-      if (const auto estimate = odometry.add_stereo(stereo)) result.push_back(*estimate);
+      if (const auto estimate = odometry.add_stereo(frame(delivery.index))) result.push_back(*estimate);
     }
     return result;
   }
@@ -326,7 +311,7 @@ TEST_CASE("C interface: a thread for each sensor, one for the estimates") {
   sensors.push_back(sensor(
       simulation.frames().size(), [&](std::size_t i) { return simulation.frame_times()[i]; },
       [&](std::size_t i) {
-        const ear_stereo_frame frame = d.frame(i);
+        const ear_stereo_frame frame = d.c_frame(i);
         return ear_add_stereo(odometry.get(), &frame);
       }));
   std::thread clock([&] {
@@ -358,7 +343,7 @@ TEST_CASE("C interface: without a camera, steps") {
   ear_odometry* raw = nullptr;
   REQUIRE(ear_create(&calibration, nullptr, &raw, nullptr, 0) == EAR_OK);
   const Handle odometry(raw);
-  const ear_stereo_frame frame = d.frame(0);
+  const ear_stereo_frame frame = d.c_frame(0);
   CHECK(ear_add_stereo(raw, &frame) == EAR_INVALID_ARGUMENT);
   ear_estimate estimate{};
   ear_result result = EAR_NO_ESTIMATE;
@@ -385,7 +370,7 @@ TEST_CASE("C interface: a full queue refuses and counts; other queues go on") {
     const ear_imu_sample sample = drive().imu(i);
     if (ear_add_imu(odometry.get(), &sample) == EAR_QUEUE_FULL) ++refused;
   }
-  const ear_stereo_frame first = drive().frame(0);
+  const ear_stereo_frame first = drive().c_frame(0);
   CHECK(ear_add_stereo(odometry.get(), &first) == EAR_OK);
   CHECK(ear_add_stereo(odometry.get(), &first) == EAR_QUEUE_FULL);
   ear_counts counts{};
@@ -449,7 +434,7 @@ TEST_CASE("C interface: null is refused everywhere") {
   CHECK(ear_add_imu(nullptr, &imu) == EAR_INVALID_ARGUMENT);
   CHECK(ear_process(nullptr, &estimate) == EAR_INVALID_ARGUMENT);
   CHECK(ear_reset(nullptr) == EAR_INVALID_ARGUMENT);
-  ear_stereo_frame frame = drive().frame(0);
+  ear_stereo_frame frame = drive().c_frame(0);
   frame.stride = 10;
   CHECK(ear_add_stereo(odometry, &frame) == EAR_INVALID_ARGUMENT);
   ear_state state{};

@@ -33,9 +33,9 @@ struct EvaluatedEstimate {
   Eigen::Vector3d dtheta_W;  ///< [rad]
 };
 
-/// Feeds the simulation to the filter; `change` may alter a frame's features before they go in.
-inline std::vector<EvaluatedEstimate> run_filter(Filter& filter, const simulator::Simulation& simulation,
-                                                 const experiments::ChangeFrame& change = {}) {
+/// Feeds the simulation to the estimator; `change` may alter a frame's features before they go in.
+inline std::vector<EvaluatedEstimate> run_estimator(Estimator& estimator, const simulator::Simulation& simulation,
+                                                    const experiments::ChangeFrame& change = {}) {
   std::vector<EvaluatedEstimate> result;
   std::optional<WorldAlignment> world;
   const TimeNs first_ns = simulation.frame_times().front();
@@ -48,8 +48,13 @@ inline std::vector<EvaluatedEstimate> run_filter(Filter& filter, const simulator
   };
   experiments::ReplayOptions options;
   options.change = change;
-  experiments::replay(simulation, filter, compare, options);
+  experiments::replay(simulation, estimator, compare, options);
   return result;
+}
+
+inline std::vector<EvaluatedEstimate> run_filter(Filter& filter, const simulator::Simulation& simulation,
+                                                 const experiments::ChangeFrame& change = {}) {
+  return run_estimator(filter, simulation, change);
 }
 
 }  // namespace ear::test

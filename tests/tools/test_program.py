@@ -80,6 +80,14 @@ class EndToEnd(unittest.TestCase):
         text = self.run_ear("bench", recording, "--compare", old)
         self.assertRegex(text, r"pipeline +\d+\.\d+ +\d+\.\d+ +[+-]\d+\.\d %")
 
+    def check_smoother(self, recording, output):
+        if "{filter,smoother}" not in ear("run", "--help").stdout:
+            return  # built without Ceres
+        self.run_ear("run", recording, "--estimator", "smoother", "--out", output)
+        figures = json.loads(self.run_ear("evaluate", output, recording, "--json"))["estimates"][0]
+        self.assertGreater(figures["coverage"], 0.7)
+        self.assertLess(figures["ate_rmse_m"], 0.02)
+
     def test_from_simulation_to_report(self):
         with tempfile.TemporaryDirectory() as folder:
             recording, output, report = (Path(folder) / name for name in ("recording", "output", "report.html"))
@@ -87,6 +95,7 @@ class EndToEnd(unittest.TestCase):
             self.run_ear("check", recording)
             self.run_ear("run", recording, "--out", output)
             self.check_bench(recording, Path(folder) / "bench.json")
+            self.check_smoother(recording, Path(folder) / "smoothed")
             evaluation = json.loads(self.run_ear("evaluate", output, recording, "--json", "--report", report))
 
             with (output / "states.csv").open(encoding="utf-8") as states:
@@ -102,6 +111,16 @@ class EndToEnd(unittest.TestCase):
             self.assertLess(figures["ate_rmse_m"], 0.02)
             self.assertLess(figures["ground"]["z_rmse_m"], 0.02)
             self.assertLess(figures["ground"]["slope_along"]["rmse_deg"], 2.0)
+            self.check_switch("motion_prediction", recording, Path(folder), (output / "estimate.tum").read_text())
+
+    def check_switch(self, setting, recording, folder, estimate):
+        """A setting of the front end that is true by default reaches it."""
+        config = folder / "switched.yaml"
+        config.write_text(f"frontend:\n  {setting}: false\n", encoding="utf-8")
+        self.run_ear("run", recording, "--config", config, "--out", folder / "switched")
+        switched = (folder / "switched" / "estimate.tum").read_text(encoding="utf-8")
+        self.assertNotEqual(switched, estimate)
+        self.assertEqual(len(switched.splitlines()), len(estimate.splitlines()))
 
 
 if __name__ == "__main__":

@@ -1,0 +1,49 @@
+// What a front end, and whoever feeds samples, needs of an estimator: the filter, or another to compare it with.
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+
+#include "ear/odometry.h"
+#include "ear/types.h"
+#include "filter/state.h"
+
+namespace ear {
+
+/// How the body moved between two frames.
+struct RelativeMotion {
+  Eigen::Matrix3d R_B1B0 = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d p_B0B1 = Eigen::Vector3d::Zero();  ///< [m]
+  bool translation_known = false;
+};
+
+/// Meanings, and what is refused: class Filter.
+class Estimator {
+ public:
+  virtual ~Estimator() = default;
+
+  virtual void add_imu(const ImuSample& sample) = 0;
+  virtual void add_encoder(const EncoderSample& sample) = 0;
+  virtual void add_laser(const LaserSample& sample) = 0;
+
+  [[nodiscard]] virtual std::optional<RelativeMotion> motion_to(TimeNs t_ns) const = 0;
+  [[nodiscard]] virtual std::optional<TimeNs> common_stamp(TimeNs camera_stamp_ns) = 0;
+  virtual std::optional<Estimate> process(const FeatureFrame& frame) = 0;
+  virtual std::optional<Estimate> process_without_image(TimeNs t_ns) = 0;
+  [[nodiscard]] virtual std::optional<NavState> predict(TimeNs t_ns) const = 0;
+
+  [[nodiscard]] virtual Status status() const = 0;
+  [[nodiscard]] virtual const Health& health() const = 0;
+  virtual void refuse_frame() = 0;
+  virtual void set_window(int clones) = 0;
+  [[nodiscard]] virtual InputCounts input_counts() const = 0;
+  [[nodiscard]] virtual bool covers(TimeNs t_ns) const = 0;
+  [[nodiscard]] virtual bool is_next(TimeNs t_ns) const = 0;
+  [[nodiscard]] virtual TimeNs camera_time(TimeNs imu_time_ns) const = 0;
+
+  /// The calibration in use.
+  [[nodiscard]] virtual CameraState cameras() const = 0;
+  [[nodiscard]] virtual OdometerState odometer() const = 0;
+};
+
+}  // namespace ear
