@@ -12,8 +12,8 @@ namespace ear::smoother {
 
 struct Factor {
   std::unique_ptr<ceres::CostFunction> cost;
-  ceres::LossFunction* loss = nullptr;  ///< of the squared length of the residual; none: the half of it itself
   std::vector<double*> blocks;
+  ceres::LossFunction* loss = nullptr;  ///< of the squared length of the residual; none: the half of it itself
 };
 
 /// Writes a derivative as Ceres lays it out, row by row.

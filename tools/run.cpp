@@ -1,6 +1,7 @@
 // ear run RECORDING: replays a recording through the estimator; writes the trajectory and what explains it.
 #include <opencv2/core/utility.hpp>
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cstdio>
@@ -17,6 +18,7 @@
 #include "src/recording/recording.h"
 #include "src/recording/writers.h"
 #include "tools/commands.h"
+#include "tools/estimators.h"
 #include "tools/flight_controller.h"
 #include "tools/opened_recording.h"
 #include "tools/progress.h"
@@ -33,6 +35,7 @@ struct RunArguments {
   double camera_rate_hz = 0.0;
   bool mono = false;
   std::optional<OdometerModel> odometer;
+  std::string estimator = "filter";
   FlightControllerArguments flight_controller;
 };
 
@@ -43,6 +46,8 @@ struct Totals {
   std::uint64_t frames = 0;
   std::uint64_t estimates = 0;
   std::uint64_t standing = 0;
+  std::uint64_t reduced = 0;  ///< frames with work left out to keep the budget, or left out themselves
+  int most_reduced = 0;       ///< the largest load step
   std::uint64_t features_used = 0;
   std::uint64_t features_rejected = 0;
   std::uint64_t wheel_rows_used = 0;
@@ -56,6 +61,8 @@ struct Totals {
     const std::string text = to_text(said);
     const bool changed = health.empty() || health.back().text != text;
     if (changed && health.size() < kMostChanges) health.push_back({t_ns, text});
+    reduced += said.load_step > 0 ? 1 : 0;
+    most_reduced = std::max(most_reduced, said.load_step);
   }
 
   void add(const ReplayedFrame& frame, const StageTimes& stages) {
@@ -131,6 +138,8 @@ RunSummary summarize(const RunArguments& args, const Recording& recording, const
   summary.counts = {{"frames", totals.frames},
                     {"estimates", totals.estimates},
                     {"frames_standing", totals.standing},
+                    {"frames_reduced", totals.reduced},
+                    {"largest_load_step", static_cast<std::uint64_t>(totals.most_reduced)},
                     {"features_used", totals.features_used},
                     {"features_rejected", totals.features_rejected},
                     {"wheel_rows_used", totals.wheel_rows_used},
@@ -173,7 +182,7 @@ void run(const RunArguments& args) {
   options.mono = args.mono;
   const OpenedRecording opened(args.recording, args.config);
   Recording recording(opened.folder(), options);
-  Odometry odometry(config, recording.calibration());
+  Odometry odometry(config, recording.calibration(), estimator_named(args.estimator));
 
   std::filesystem::create_directories(args.out);
   TumWriter trajectory(args.out / "estimate.tum");
@@ -211,6 +220,10 @@ void run(const RunArguments& args) {
   std::printf("%llu of %llu frames estimated, %.1f s of recording in %.1f s: %s\n",
               static_cast<unsigned long long>(totals.estimates), static_cast<unsigned long long>(totals.frames),
               seconds_between(recording.span().first_ns, recording.span().last_ns), wall_time(), args.out.c_str());
+  if (totals.reduced > 0) {
+    std::printf("work was left out at %llu frames to keep %g ms, up to load step %d\n",
+                static_cast<unsigned long long>(totals.reduced), config.performance.budget_ms, totals.most_reduced);
+  }
   if (flight_controller) std::printf("%s\n", flight_controller->report().c_str());
   for (const Warning& warning : recording.warnings()) {
     std::fprintf(stderr, "ear: warning: %s, %llu times, first at %s\n", warning.kind.c_str(),
@@ -245,6 +258,9 @@ void add_run_command(CLI::App& app) {
   for (const auto& [name, model] : names_of(OdometerModel{})) models.emplace(name, model);
   command->add_option("--odometer", args->odometer, "What is made of the wheels: none, differential, gyro or terrain")
       ->transform(CLI::CheckedTransformer(models));
+  command->add_option("--estimator", args->estimator, "filter, or smoother to compare with (docs/smoother.md)")
+      ->check(CLI::IsMember(estimator_names()))
+      ->capture_default_str();
   add_options(*command, args->flight_controller);
   command->callback([args] { run(*args); });
 }

@@ -15,6 +15,7 @@
 
 #include "src/recording/config_fields.h"
 #include "src/recording/config_file.h"
+#include "tools/estimators.h"
 #include "tools/evaluation/alignment.h"
 #include "tools/experiments/in_parallel.h"
 #include "tools/experiments/seeds.h"
@@ -32,6 +33,7 @@ struct Arguments {
   std::vector<std::string> seeds{"501..505"};
   std::string calibration = "both";
   std::vector<OdometerModel> odometers;
+  std::vector<std::string> estimators;
   bool without_camera = false;
   std::vector<double> rates{30.0};
   std::vector<std::filesystem::path> configs;
@@ -49,6 +51,7 @@ struct Variant {
   bool true_calibration = true;
   std::string settings;
   FilterConfig config;
+  EstimatorChoice estimator = {};
 };
 
 std::vector<simulator::Options> simulations_of(const Arguments& args) {
@@ -90,11 +93,26 @@ std::vector<Variant> settings_of(const Arguments& args) {
   return settings;
 }
 
+/// `settings` once for each estimator that was asked for; those are timed.
+std::vector<Variant> with_estimators(const Arguments& args, const std::vector<Variant>& settings) {
+  if (args.estimators.empty()) return settings;
+  std::vector<Variant> variants;
+  for (Variant variant : settings) {
+    const std::string name = variant.settings;
+    for (const std::string& estimator : args.estimators) {
+      variant.settings = name == "default" ? estimator : estimator + " " + name;
+      variant.estimator = {tools::estimator_named(estimator), true};
+      variants.push_back(variant);
+    }
+  }
+  return variants;
+}
+
 std::vector<Variant> variants_of(const Arguments& args) {
   std::vector<Variant> variants;
   for (const bool true_calibration : {true, false}) {
     if (args.calibration == (true_calibration ? "wrong" : "true")) continue;
-    for (Variant variant : settings_of(args)) {
+    for (Variant variant : with_estimators(args, settings_of(args))) {
       variant.true_calibration = true_calibration;
       variants.push_back(variant);
     }
@@ -111,7 +129,8 @@ std::vector<Run> run(const simulator::Options& options, const std::vector<Varian
     if (args.without_camera) told.cameras.clear();
     const Setup setup{options.sequence, options.camera_rate_hz, name_of(variant.config.odometer.model),
                       variant.true_calibration, variant.settings};
-    runs.push_back({setup, options.seed, measure(simulation, told, variant.config, args.alignment)});
+    runs.push_back(
+        {setup, options.seed, measure(simulation, told, variant.config, args.alignment, {}, variant.estimator)});
   }
   return runs;
 }
@@ -151,6 +170,9 @@ int parse_and_run(int argc, char** argv) {
   app.add_option("--odometer", args.odometers, "none, differential, gyro or terrain, several with commas; else as set")
       ->delimiter(',')
       ->transform(CLI::CheckedTransformer(models).description(""));
+  app.add_option("--estimator", args.estimators, "filter or smoother, both with a comma: a row for each, with its time")
+      ->delimiter(',')
+      ->check(CLI::IsMember(tools::estimator_names()));
   app.add_flag("--without-camera", args.without_camera, "the other sensors alone, an estimate at the camera's rate");
   app.add_option("--rate", args.rates, "of the camera [Hz], several with commas")
       ->delimiter(',')

@@ -86,17 +86,21 @@ void take_errors(const evaluation::Evaluation& evaluation, Figures& figures) {
 }  // namespace
 
 Figures measure(const simulator::Simulation& simulation, const Calibration& calibration, const FilterConfig& config,
-                evaluation::AlignmentKind alignment, const OnHealth& on_health) {
-  Filter filter(config, calibration);
+                evaluation::AlignmentKind alignment, const OnHealth& on_health, const EstimatorChoice& choice) {
+  const std::unique_ptr<Estimator> made =
+      choice.make ? choice.make(config, calibration) : std::make_unique<Filter>(config, calibration);
+  Estimator& estimator = *made;
   Record record;
+  double processor_time = 0.0;
   ReplayOptions options;
+  if (choice.timed) options.processor_time = &processor_time;
   options.camera = !calibration.cameras.empty();
   options.wheels = calibration.encoder && config.odometer.model != OdometerModel::none;
   if (on_health) {
-    options.after = [&](const simulator::Delivery& delivery) { on_health(delivery.arrival_ns, filter.health()); };
+    options.after = [&](const simulator::Delivery& delivery) { on_health(delivery.arrival_ns, estimator.health()); };
   }
   replay(
-      simulation, filter, [&](TimeNs, const Estimate& estimate) { record.add(estimate); }, options);
+      simulation, estimator, [&](TimeNs, const Estimate& estimate) { record.add(estimate); }, options);
   if (config.odometer.model == OdometerModel::none) record.estimate.terrain.clear();  // it was not asked
 
   Figures figures;
@@ -111,6 +115,7 @@ Figures measure(const simulator::Simulation& simulation, const Calibration& cali
   const evaluation::PoseCovariance& last = estimate.covariance.back();
   figures.sigma_position = std::sqrt(last.topLeftCorner<3, 3>().trace());
   figures.sigma_orientation = kDegPerRad * std::sqrt(last.bottomRightCorner<3, 3>().trace());
+  if (choice.timed) figures.frame_time = 1e3 * processor_time / static_cast<double>(estimate.poses.size());
   figures.features_rejected = record.features.rejected_percent();
   figures.wheel_rows_rejected = record.wheel_rows.rejected_percent();
   figures.beams_rejected = record.beams.rejected_percent();

@@ -7,6 +7,7 @@
 #include "ear/calibration.h"
 #include "ear/filter_config.h"
 #include "ear/health.h"
+#include "ear/odometry.h"
 #include "tools/evaluation/evaluate.h"
 #include "tools/simulator/simulation.h"
 
@@ -35,16 +36,23 @@ struct Figures {
   std::optional<double> features_rejected;    ///< share of the features tried [%]
   std::optional<double> wheel_rows_rejected;  ///< share of the odometer's rows [%]
   std::optional<double> beams_rejected;       ///< share of the laser ranges [%]
+  std::optional<double> frame_time;           ///< of the processor per estimate, all samples between included [ms]
 };
 
 /// The time is when the sample arrived.
 using OnHealth = std::function<void(TimeNs arrival_ns, const Health& health)>;
+
+/// Which estimator is run.
+struct EstimatorChoice {
+  MakeEstimator make = {};  ///< none: the filter
+  bool timed = false;       ///< with Figures::frame_time, which is never the same twice
+};
 
 /// Runs a new filter that is told `calibration`; without cameras in it, without images. A run whose estimate stops
 /// being finite keeps only its coverage. `on_health`, if given, is told what the health is after every sample and
 /// frame.
 [[nodiscard]] Figures measure(const simulator::Simulation& simulation, const Calibration& calibration,
                               const FilterConfig& config, evaluation::AlignmentKind alignment,
-                              const OnHealth& on_health = {});
+                              const OnHealth& on_health = {}, const EstimatorChoice& choice = {});
 
 }  // namespace ear::experiments

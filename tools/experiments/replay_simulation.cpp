@@ -1,37 +1,59 @@
 #include "tools/experiments/replay_simulation.h"
 
+#include <time.h>
+
 #include <optional>
 
 #include "tools/blind_steps.h"
 #include "tools/experiments/sample_feed.h"
 
 namespace ear::experiments {
+namespace {
 
-void replay(const simulator::Simulation& simulation, Filter& filter, const OnEstimate& on_estimate,
+/// Of this thread [s].
+double processor_time() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+}  // namespace
+
+void replay(const simulator::Simulation& simulation, Estimator& estimator, const OnEstimate& on_estimate,
             const ReplayOptions& options) {
   tools::BlindSteps steps(options.camera, options.wheels);
-  const auto estimate = [&](TimeNs stamp_ns, const std::optional<Estimate>& result) {
-    if (result) on_estimate(stamp_ns, *result);
+  const auto report = [&](TimeNs stamp_ns, const std::optional<Estimate>& estimate) {
+    if (estimate) on_estimate(stamp_ns, *estimate);
+  };
+  const auto timed = [&](const auto& call) {
+    const double start = options.processor_time != nullptr ? processor_time() : 0.0;
+    call();
+    if (options.processor_time != nullptr) *options.processor_time += processor_time() - start;
   };
   for (const simulator::Delivery& delivery : simulation.deliveries()) {
-    if (delivery.stream == simulator::SensorStream::encoder && options.change_encoder) {
-      filter.add_encoder(options.change_encoder(simulation.encoders()[delivery.index]));
-    } else if (delivery.stream == simulator::SensorStream::laser && options.change_laser) {
-      filter.add_laser(options.change_laser(simulation.lasers()[delivery.index]));
-    } else {
-      hand_over(simulation, delivery, filter);
-    }
+    timed([&] {
+      if (delivery.stream == simulator::SensorStream::encoder && options.change_encoder) {
+        estimator.add_encoder(options.change_encoder(simulation.encoders()[delivery.index]));
+      } else if (delivery.stream == simulator::SensorStream::laser && options.change_laser) {
+        estimator.add_laser(options.change_laser(simulation.lasers()[delivery.index]));
+      } else {
+        hand_over(simulation, delivery, estimator);
+      }
+    });
+    std::optional<Estimate> result;
     if (delivery.stream == simulator::SensorStream::camera && options.camera) {
       FeatureFrame frame = simulation.tracks(delivery.index);
-      if (const std::optional<TimeNs> stamp_ns = filter.common_stamp(frame.t_ns)) {
+      if (const std::optional<TimeNs> stamp_ns = estimator.common_stamp(frame.t_ns)) {
         frame.t_ns = *stamp_ns;
         if (options.change) options.change(frame);
-        if (filter.is_next(frame.t_ns) && filter.covers(frame.t_ns)) steps.saw_frame(delivery.arrival_ns);
-        estimate(frame.t_ns, filter.process(frame));
+        if (estimator.is_next(frame.t_ns) && estimator.covers(frame.t_ns)) steps.saw_frame(delivery.arrival_ns);
+        timed([&] { result = estimator.process(frame); });
+        report(frame.t_ns, result);
       }
     } else if (delivery.stream == simulator::SensorStream::imu && steps.due(delivery.arrival_ns)) {
-      const TimeNs stamp_ns = filter.camera_time(simulation.imu()[delivery.index].t_ns);
-      estimate(stamp_ns, filter.process_without_image(stamp_ns));
+      const TimeNs stamp_ns = estimator.camera_time(simulation.imu()[delivery.index].t_ns);
+      timed([&] { result = estimator.process_without_image(stamp_ns); });
+      report(stamp_ns, result);
     }
     if (options.after) options.after(delivery);
   }

@@ -1,14 +1,14 @@
-// A filter on a simulation's samples and feature tracks: how every experiment and every test runs one.
+// An estimator on a simulation's samples and feature tracks: how every experiment and every test runs one.
 #pragma once
 
 #include <functional>
 
-#include "filter/filter.h"
+#include "filter/estimator.h"
 #include "tools/simulator/simulation.h"
 
 namespace ear::experiments {
 
-/// May alter a frame's features before the filter gets them.
+/// May alter a frame's features before the estimator gets them.
 using ChangeFrame = std::function<void(FeatureFrame&)>;
 
 /// Gives the sample that the filter gets in the place of a simulated one.
@@ -26,12 +26,13 @@ struct ReplayOptions {
   ChangeEncoder change_encoder = {};
   ChangeLaser change_laser = {};
   OnDelivery after = {};
-  bool camera = true;  ///< false: no frame is handed over
-  bool wheels = true;  ///< false: no steps while frames are missing (tools/blind_steps.h)
+  bool camera = true;                ///< false: no frame is handed over
+  double* processor_time = nullptr;  ///< if given, the estimator's [s] is added to it
+  bool wheels = true;                ///< false: no steps while frames are missing (tools/blind_steps.h)
 };
 
 /// Feeds all samples and frames in the order of their arrival, as `ear run` does.
-void replay(const simulator::Simulation& simulation, Filter& filter, const OnEstimate& on_estimate,
+void replay(const simulator::Simulation& simulation, Estimator& estimator, const OnEstimate& on_estimate,
             const ReplayOptions& options = {});
 
 }  // namespace ear::experiments

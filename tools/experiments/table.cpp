@@ -25,7 +25,7 @@ struct NamedField {
   Field field;
 };
 
-constexpr std::array<NamedField, 20> kFields{{
+constexpr std::array<NamedField, 21> kFields{{
     {"length_m", &Figures::length},
     {"ate_rmse_m", &Figures::ate_rmse},
     {"ate_percent", &Figures::ate_percent},
@@ -46,6 +46,7 @@ constexpr std::array<NamedField, 20> kFields{{
     {"features_rejected_percent", &Figures::features_rejected},
     {"wheel_rows_rejected_percent", &Figures::wheel_rows_rejected},
     {"beams_rejected_percent", &Figures::beams_rejected},
+    {"frame_time_ms", &Figures::frame_time},
 }};
 
 struct Column {
@@ -56,7 +57,7 @@ struct Column {
 
 double median_of(const Values& values) { return median(values); }
 
-constexpr std::array<Column, 22> kColumns{{
+constexpr std::array<Column, 23> kColumns{{
     {"length [m]", &Figures::length, median_of},
     {"ATE [m]", &Figures::ate_rmse, median_of},
     {"worst", &Figures::ate_rmse, worst},
@@ -79,6 +80,7 @@ constexpr std::array<Column, 22> kColumns{{
     {"features rejected [%]", &Figures::features_rejected, mean},
     {"wheel rows", &Figures::wheel_rows_rejected, mean},
     {"beams", &Figures::beams_rejected, mean},
+    {"time per frame [ms]", &Figures::frame_time, median_of},
 }};
 
 /// Three significant digits, whole numbers from 1000 on.

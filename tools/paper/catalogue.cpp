@@ -277,8 +277,9 @@ std::vector<TableDefinition> ablation_tables(const Texts& sequences, bool tracks
                       {}});
   }
   for (const std::string& name : ablation()) {
-    if (!tracks && find_configuration(name).tracks_only) continue;
-    const std::string title = find_configuration(name).title;
+    const Configuration& configuration = find_configuration(name);
+    if (tracks ? configuration.images_only : configuration.tracks_only) continue;
+    const std::string& title = configuration.title;
     Row means{title, {}, {}};
     for (std::size_t i = 0; i < kAblationRates.size(); ++i) {
       Cell mean{{}, Figure::ate, "default"};

@@ -8,6 +8,7 @@
 #include <type_traits>
 
 #include "src/recording/config_fields.h"
+#include "tools/estimators.h"
 
 namespace ear::paper {
 namespace {
@@ -55,6 +56,10 @@ std::vector<Configuration> left_out() {
   together.beams_together = true;
   together.tracks_only = true;
   list.push_back(together);
+  Configuration unpredicted =
+      with("no-prediction", "no motion prediction", [](Config& c) { c.frontend.motion_prediction = false; });
+  unpredicted.images_only = true;
+  list.push_back(unpredicted);
   Configuration no_lasers = with("no-lasers", "no lasers, no slope", [](Config&) {});
   no_lasers.lasers = false;
   list.push_back(no_lasers);
@@ -92,7 +97,12 @@ void append_fields(std::string& text, const std::string& prefix, const Settings&
 
 }  // namespace
 
-bool is_built(Estimator estimator) { return estimator == Estimator::filter; }
+std::string name_of(Estimator estimator) { return estimator == Estimator::filter ? "filter" : "smoother"; }
+
+bool is_built(Estimator estimator) {
+  const std::vector<std::string> built = tools::estimator_names();
+  return std::find(built.begin(), built.end(), name_of(estimator)) != built.end();
+}
 
 const std::vector<Configuration>& configurations() {
   static const std::vector<Configuration> all = all_configurations();
@@ -103,7 +113,7 @@ const std::vector<std::string>& ablation() {
   static const std::vector<std::string> names{
       "default",          "none",         "no-pitch-rate", "no-lasers",
       "beams-together",   "no-side-slip", "weights-off",   "weights-mahalanobis",
-      "weights-distance", "displacement", "oldest-clone"};
+      "weights-distance", "displacement", "oldest-clone",  "no-prediction"};
   return names;
 }
 

@@ -12,6 +12,9 @@ namespace ear::paper {
 /// Who makes the estimate. The optimiser gets the same tracks and the same weights.
 enum class Estimator { filter, smoother };
 
+/// As `ear run --estimator` names it.
+[[nodiscard]] std::string name_of(Estimator estimator);
+
 /// Whether this program has it.
 [[nodiscard]] bool is_built(Estimator estimator);
 
@@ -24,6 +27,7 @@ struct Configuration {
   bool pitch_rate = true;  ///< false: the encoders' angles come without the body's pitch, so that (5) gives nothing
   bool beams_together = false;  ///< true: a reading of the lasers in which one has no return is left out
   bool tracks_only = false;     ///< it changes samples, which only a simulation in memory allows
+  bool images_only = false;     ///< it changes the front end
 };
 
 /// All that can be asked for by name: the default settings, the odometer models, the anomaly weights on and off, the

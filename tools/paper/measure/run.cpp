@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <ctime>
+#include <memory>
 #include <stdexcept>
 #include <vector>
 
-#include "filter/filter.h"
+#include "filter/estimator.h"
 #include "src/recording/recording.h"
+#include "tools/estimators.h"
 #include "tools/evaluation/evaluate.h"
 #include "tools/evaluation/read.h"
 #include "tools/experiments/replay_simulation.h"
@@ -91,29 +93,29 @@ Result result_of(const Record& record, const evaluation::Trajectory& truth) {
   return result;
 }
 
-void require_built(const Configuration& configuration) {
+MakeEstimator maker_of(const Configuration& configuration) {
   if (!is_built(configuration.estimator)) throw std::logic_error("this program has no " + configuration.name);
+  return tools::estimator_named(name_of(configuration.estimator));
 }
 
 }  // namespace
 
 Result run_on_tracks(const simulator::Simulation& simulation, const Configuration& configuration) {
-  require_built(configuration);
   const Calibration calibration = told(configuration, simulation.calibration());
   const FilterConfig& config = configuration.config.filter;
-  Filter filter(config, calibration);
+  const std::unique_ptr<ear::Estimator> estimator = maker_of(configuration)(config, calibration);
   Record record;
   experiments::ReplayOptions options;
   options.wheels = calibration.encoder && config.odometer.model != OdometerModel::none;
   if (!configuration.pitch_rate) options.change_encoder = WithoutPitch(simulation, calibration);
   if (configuration.beams_together) options.change_laser = together;
   double begin = 0.0;
-  options.change = [&](FeatureFrame&) { begin = thread_time(); };  // the last thing before the filter has the frame
+  options.change = [&](FeatureFrame&) { begin = thread_time(); };  // the last thing before the estimator has the frame
   options.after = [&](const simulator::Delivery& delivery) {
     if (delivery.stream == simulator::SensorStream::camera) record.frame_times.push_back(thread_time() - begin);
   };
   experiments::replay(
-      simulation, filter, [&](TimeNs, const Estimate& estimate) { record.add(estimate); }, options);
+      simulation, *estimator, [&](TimeNs, const Estimate& estimate) { record.add(estimate); }, options);
 
   std::vector<TimeNs> times;
   for (const evaluation::Pose& pose : record.estimate.poses) times.push_back(pose.t_ns);
@@ -122,11 +124,10 @@ Result run_on_tracks(const simulator::Simulation& simulation, const Configuratio
 
 Result run_on_images(const std::filesystem::path& recording, double camera_rate_hz,
                      const Configuration& configuration) {
-  require_built(configuration);
   RecordingOptions options;
   options.camera_rate_hz = camera_rate_hz;
   Recording samples(recording, options);
-  Odometry odometry(configuration.config, told(configuration, samples.calibration()));
+  Odometry odometry(configuration.config, told(configuration, samples.calibration()), maker_of(configuration));
   Record record;
   double begin = 0.0;
   const auto before_sample = [&](const Sample&) { begin = thread_time(); };  // a frame goes with the sample after it
