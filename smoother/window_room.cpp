@@ -63,7 +63,6 @@ std::size_t Window::frame_to_leave() const {
 /// What the oldest frame and all features that it saw tell of the others becomes part of the prior. These features'
 /// later observations are used up with it: each observation counts once.
 void Window::marginalize_oldest() {
-  collect_between();  // as they are now
   Frame& oldest = *frames_.front();
   collect_leaving_points(oldest.number);
   const auto seen_from_oldest = [&](const Factor& factor) { return factor.blocks.front() == oldest.pose.data(); };
