@@ -4,6 +4,7 @@
 #include <Eigen/Cholesky>
 #include <array>
 #include <atomic>
+#include <cmath>
 #include <string>
 #include <thread>
 #include <vector>
@@ -21,10 +22,13 @@ constexpr int kRuns = 50;
 constexpr double kDuration = 60.0;  // [s]
 constexpr double kMoving = 5.0;     // [s] from here on: it has left its start, where the pose is known by definition
 
-/// The mean over the runs is correlated in time: a filter whose covariance is exact is inside the band for 95 % of the
-/// time on average over many draws of seeds, but for less in some, and for more in others.
-constexpr double kShare = 0.90;         // of the time, in each case and quantity
-constexpr double kAverageShare = 0.95;  // over all cases and quantities
+// The mean over the runs is correlated in time: a filter whose covariance is exact is inside the band for 95 % of the
+// time on average over many draws of seeds, but for less in some, and for more in others. To be above it is the
+// dangerous side; to be below it for a while is chance if the mean over all the time is right.
+constexpr double kMostAbove = 0.07;     // of the time, in each case and quantity
+constexpr double kShare = 0.85;         // inside, the same
+constexpr double kAverageShare = 0.95;  // inside, over all cases and quantities
+constexpr double kSigmas = 3.0;         // so far may the mean over runs and time be off 3
 
 constexpr std::uint64_t kFirstSeed = 7001;  // not used in development
 constexpr int kGroups = 4;                  // of kRuns seeds each: kFirstSeed, kFirstSeed + 100, ...
@@ -101,57 +105,76 @@ std::vector<Nees> run_all(const Case& setup, std::uint64_t first_seed) {
   return all;
 }
 
-/// Share of the time in which the mean over the runs lies in the band that 95 % of chi-squared means of 3 dof lie in.
-double share_in_band(const std::vector<Nees>& runs, const std::vector<double> Nees::*which, const std::string& name) {
+/// What the runs of one case tell of one quantity.
+struct Judgement {
+  double inside = 0.0;    ///< share of the time in which the mean over the runs is in the band
+  double above = 0.0;     ///< and above it: overconfident
+  double mean = 0.0;      ///< over runs and time
+  double mean_sigma = 0;  ///< its standard deviation, from how the runs differ: however they are correlated in time
+};
+
+/// The band: where 95 % of the means over the runs of chi-squared numbers of 3 dof lie.
+Judgement judge(const std::vector<Nees>& runs, const std::vector<double> Nees::*which, const std::string& name) {
   const double low = ChiSquaredGate(0.025, 3 * kRuns)(3 * kRuns) / kRuns;
   const double high = ChiSquaredGate(0.975, 3 * kRuns)(3 * kRuns) / kRuns;
   std::size_t frames = (runs.front().*which).size();
   for (const Nees& nees : runs) frames = std::min(frames, (nees.*which).size());
   REQUIRE(frames > 1000);
-  std::size_t inside = 0;
-  double total = 0.0;
-  for (std::size_t i = 0; i < frames; ++i) {
-    double mean = 0.0;
-    for (const Nees& nees : runs) mean += (nees.*which)[i] / kRuns;
-    inside += mean >= low && mean <= high ? 1 : 0;
-    total += mean / static_cast<double>(frames);
+  Eigen::ArrayXd over_runs = Eigen::ArrayXd::Zero(static_cast<Eigen::Index>(frames));
+  Eigen::Array<double, kRuns, 1> over_time;
+  for (int i = 0; i < kRuns; ++i) {
+    const Eigen::Map<const Eigen::ArrayXd> nees((runs[static_cast<std::size_t>(i)].*which).data(), over_runs.size());
+    over_runs += nees / kRuns;
+    over_time(i) = nees.mean();
   }
-  const double share = static_cast<double>(inside) / static_cast<double>(frames);
-  MESSAGE(name << ": mean NEES " << total << " of 3, " << share << " of the time within " << low << " to " << high);
-  return share;
+  Judgement judgement;
+  judgement.above = (over_runs > high).cast<double>().mean();
+  judgement.inside = (over_runs >= low && over_runs <= high).cast<double>().mean();
+  judgement.mean = over_time.mean();
+  judgement.mean_sigma = std::sqrt((over_time - judgement.mean).square().sum() / (kRuns - 1) / kRuns);
+  MESSAGE(name << ": mean NEES " << judgement.mean << " +- " << judgement.mean_sigma << " of 3, " << judgement.inside
+               << " of the time within " << low << " to " << high << ", " << judgement.above << " above");
+  return judgement;
 }
 
-/// Average over all cases and both quantities; `shares` takes each.
-double measure(std::uint64_t first_seed, std::vector<double>& shares) {
+/// All cases and both quantities.
+std::vector<Judgement> measure(std::uint64_t first_seed) {
   constexpr std::array kCases = {Case{"flat1", false, false}, Case{"flat1", true, false}, Case{"fly1", false, false},
                                  Case{"fly1", true, false},   Case{"flat1", false, true}, Case{"fly1", false, true}};
-  double total = 0.0;
+  std::vector<Judgement> judgements;
   for (const Case& setup : kCases) {
-    MESSAGE(
-        std::string(setup.sequence) << std::string(setup.calibrate ? ", calibration estimated" : ", calibration known")
-                                    << std::string(setup.odometer ? ", with the odometer" : ""));
+    const std::string name = std::string(setup.sequence) +
+                             (setup.calibrate ? ", calibration estimated" : ", calibration known") +
+                             (setup.odometer ? ", with the odometer" : "");
     const std::vector<Nees> runs = run_all(setup, first_seed);
-    shares.push_back(share_in_band(runs, &Nees::position, "position"));
-    shares.push_back(share_in_band(runs, &Nees::orientation, "orientation"));
-    total += shares[shares.size() - 2] + shares.back();
+    judgements.push_back(judge(runs, &Nees::position, name + ", position"));
+    judgements.push_back(judge(runs, &Nees::orientation, name + ", orientation"));
   }
-  return total / (2.0 * kCases.size());
+  return judgements;
+}
+
+double average_share(const std::vector<Judgement>& judgements) {
+  double total = 0.0;
+  for (const Judgement& judgement : judgements) total += judgement.inside;
+  return total / static_cast<double>(judgements.size());
 }
 
 }  // namespace
 
 TEST_CASE("consistency: fifty runs") {
-  std::vector<double> shares;
-  const double average = measure(kFirstSeed, shares);
-  for (const double share : shares) CHECK(share >= kShare);
-  CHECK(average >= kAverageShare);
+  const std::vector<Judgement> judgements = measure(kFirstSeed);
+  for (const Judgement& judgement : judgements) {
+    CHECK(judgement.above <= kMostAbove);
+    CHECK(judgement.inside >= kShare);
+    CHECK(std::abs(judgement.mean - 3.0) <= kSigmas * judgement.mean_sigma);
+  }
+  CHECK(average_share(judgements) >= kAverageShare);
 }
 
 TEST_CASE("consistency, extended: more draws of fifty runs") {
   double average = 0.0;
   for (std::uint64_t group = 1; group < kGroups; ++group) {
-    std::vector<double> shares;
-    average += measure(kFirstSeed + 100 * group, shares) / (kGroups - 1);
+    average += average_share(measure(kFirstSeed + 100 * group)) / (kGroups - 1);
   }
   MESSAGE("on average " << average << " of the time");
   CHECK(average >= kAverageShare - 0.02);  // 0.935 is measured for the draws 7101, 7201 and 7301
