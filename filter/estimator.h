@@ -17,6 +17,15 @@ struct RelativeMotion {
   bool translation_known = false;
 };
 
+/// From where the body was at one frame to where it is at the next.
+[[nodiscard]] inline RelativeMotion motion_between(const Pose& T_WB0, const NavState& next) {
+  RelativeMotion motion;
+  motion.R_B1B0 = next.q_WB.toRotationMatrix().transpose() * T_WB0.R;
+  motion.p_B0B1 = T_WB0.R.transpose() * (next.p_WB - T_WB0.p);
+  motion.translation_known = true;
+  return motion;
+}
+
 /// Meanings, and what is refused: class Filter.
 class Estimator {
  public:

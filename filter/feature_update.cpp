@@ -17,12 +17,13 @@ constexpr int clone_column(int clone) { return err::clone(clone) - err::camera; 
 /// only the lower triangle is read, is singular (yaw and position are free, calibration is seen in part). The largest
 /// pivot against `scale` comes first, so that rounding does not grow; one lost in rounding says nothing, and ends it.
 /// Without the pivoting rounding makes up rows, and once in some ten thousand frames one that moves the estimate by ten
-/// sigmas. b and `pivots`, at first the diagonal of A, are overwritten.
+/// sigmas. b is overwritten; `pivots` is scratch.
 void rows_from_sums(const Eigen::Ref<const Eigen::MatrixXd>& A, Eigen::Ref<Eigen::VectorXd> b,
                     Eigen::Ref<Eigen::VectorXd> pivots, const Eigen::VectorXd& scale, double negligible,
                     WhitenedRows& rows) {
   const int size = static_cast<int>(b.size());
   auto& Ht = rows.H_transposed;
+  pivots = A.diagonal();
   rows.count = 0;
   while (rows.count < size) {
     int j = 0;
@@ -203,7 +204,6 @@ double FeatureInformation::chi_squared(const std::vector<LinearizedObservation>&
   sum_up(observations, Lv, gate_A_, gate_b_);
   scale_.head(size_) = A.diagonal();
   A.selfadjointView<Eigen::Lower>().rankUpdate(W_.block(0, 3 * features_, size_, 3), -1.0);
-  pivots_.head(size_) = A.diagonal();
   rows_from_sums(A, b, pivots_.head(size_), scale_, kRounding, gate_rows_);
 
   const int rows = gate_rows_.count;
@@ -226,7 +226,6 @@ void FeatureInformation::compress(double negligible) {
   auto A = A_.topLeftCorner(size_, size_);
   scale_.head(size_) = A.diagonal();
   A.selfadjointView<Eigen::Lower>().rankUpdate(W_.topLeftCorner(size_, 3 * features_), -1.0);
-  pivots_.head(size_) = A.diagonal();
   rows_from_sums(A, b_.head(size_), pivots_.head(size_), scale_, negligible, rows_);
 }
 

@@ -25,12 +25,6 @@ constexpr int kClonePairRows = 9;  // that a measurement between the state and o
 
 int error_capacity(const FilterConfig& config) { return err::clone(config.window + 1); }
 
-/// Pixels per unit of normalized coordinates; 1 without a camera, where nothing is measured in pixels.
-double focal_length(const Calibration& calibration) {
-  if (calibration.cameras.empty()) return 1.0;
-  return 0.5 * (calibration.cameras[0].fu + calibration.cameras[0].fv);
-}
-
 }  // namespace
 
 Filter::Filter(const FilterConfig& config, const Calibration& calibration)
@@ -179,10 +173,7 @@ void Filter::add_laser(const LaserSample& sample) {
     const auto too_old = [&] { return seconds_between(ranges_.front().t_ns, sample.t_ns) > kRollingWindow; };
     while (!ranges_.empty() && (ranges_.full() || too_old())) ranges_.pop();
   }
-  BeamRanges reading;
-  reading.t_ns = sample.t_ns;
-  std::copy(sample.range.begin(), sample.range.end(), reading.range.begin());
-  ranges_.push(reading);
+  ranges_.push(BeamRanges(sample));
 }
 
 std::optional<TimeNs> Filter::common_stamp(TimeNs camera_stamp_ns) {
@@ -195,8 +186,8 @@ std::optional<TimeNs> Filter::common_stamp(TimeNs camera_stamp_ns) {
 
 std::optional<RelativeMotion> Filter::motion_to(TimeNs t_ns) const {
   if (!is_time(t_ns) || !any_image_ || imu_.empty() || t_ns <= last_image_ns_) return std::nullopt;
-  RelativeMotion motion;
   if (status_ != Status::tracking) {
+    RelativeMotion motion;
     if (const std::optional<Eigen::Vector3d> way = moving_start_.way_to(imu_time(t_ns))) {
       motion.p_B0B1 = *way;
       motion.translation_known = true;
@@ -208,11 +199,7 @@ std::optional<RelativeMotion> Filter::motion_to(TimeNs t_ns) const {
     motion.R_B1B0 = R_B0B1.transpose();
     return motion;
   }
-  const NavState next = predict_here(imu_time(t_ns));
-  motion.R_B1B0 = next.q_WB.toRotationMatrix().transpose() * image_T_WB_.R;
-  motion.p_B0B1 = image_T_WB_.R.transpose() * (next.p_WB - image_T_WB_.p);
-  motion.translation_known = true;
-  return motion;
+  return motion_between(image_T_WB_, predict_here(imu_time(t_ns)));
 }
 
 std::optional<Estimate> Filter::process(const FeatureFrame& given) {

@@ -99,11 +99,6 @@ class Filter final : public Estimator {
   [[nodiscard]] const Covariance& covariance() const { return covariance_; }
 
  private:
-  /// Ranges of one reading; NaN without return.
-  struct BeamRanges {
-    TimeNs t_ns = 0;
-    std::array<double, kMaxBeams> range{};
-  };
   /// Attitude and velocity at a time near the state's.
   struct Motion {
     Eigen::Matrix3d R_WB;

@@ -175,15 +175,6 @@ void Filter::watch_biases(double dt) {
   monitor_.accuse_imu(jumped.gyro, jumped.accel, state_.imu.t_ns);
 }
 
-NavState Filter::predict_here(TimeNs t_ns) const {
-  ImuState x = state_.imu;
-  if (t_ns > x.t_ns) {
-    imu_.for_each_piece(x.t_ns, t_ns, [&](const Eigen::Vector3d& gyro_B, const Eigen::Vector3d& accel_B, double dt) {
-      x = integrate(x, gyro_B, accel_B, dt);
-    });
-    x.t_ns = t_ns;
-  }
-  return NavState{x.t_ns, Eigen::Quaterniond(x.R_WB).normalized(), x.p_WB, x.v_W, x.b_g, x.b_a};
-}
+NavState Filter::predict_here(TimeNs t_ns) const { return nav_state(integrate_to(t_ns, state_.imu, imu_)); }
 
 }  // namespace ear

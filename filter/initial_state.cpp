@@ -60,6 +60,11 @@ const Calibration& checked(const Calibration& calibration) {
   return calibration;
 }
 
+double focal_length(const Calibration& calibration) {
+  if (calibration.cameras.empty()) return 1.0;
+  return 0.5 * (calibration.cameras[0].fu + calibration.cameras[0].fv);
+}
+
 CameraState camera_state(const Calibration& calibration) {
   CameraState camera;
   camera.time_offset = calibration.camera_time_offset;

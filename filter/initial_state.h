@@ -12,6 +12,9 @@ namespace ear {
 [[nodiscard]] const FilterConfig& checked(const FilterConfig& config);
 [[nodiscard]] const Calibration& checked(const Calibration& calibration);
 
+/// Pixels per unit of normalized coordinates; 1 without a camera, where nothing is measured in pixels.
+[[nodiscard]] double focal_length(const Calibration& calibration);
+
 [[nodiscard]] CameraState camera_state(const Calibration& calibration);
 [[nodiscard]] OdometerState odometer_state(const Calibration& calibration);
 

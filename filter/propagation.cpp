@@ -13,6 +13,19 @@ ImuState integrate(const ImuState& x, const Eigen::Vector3d& gyro_B, const Eigen
   return next;
 }
 
+ImuState integrate_to(TimeNs t_ns, ImuState x, const ImuBuffer& samples) {
+  if (t_ns <= x.t_ns) return x;
+  samples.for_each_piece(x.t_ns, t_ns, [&](const Eigen::Vector3d& gyro_B, const Eigen::Vector3d& accel_B, double dt) {
+    x = integrate(x, gyro_B, accel_B, dt);
+  });
+  x.t_ns = t_ns;
+  return x;
+}
+
+NavState nav_state(const ImuState& x) {
+  return {x.t_ns, Eigen::Quaterniond(x.R_WB).normalized(), x.p_WB, x.v_W, x.b_g, x.b_a};
+}
+
 ErrorTransition error_transition(const ImuState& x, const Eigen::Vector3d& gyro_B, const Eigen::Vector3d& accel_B,
                                  double dt, const ImuCalibration& noise) {
   const Eigen::Vector3d phi = (gyro_B - x.b_g) * dt;

@@ -4,6 +4,8 @@
 #include <Eigen/Core>
 
 #include "ear/calibration.h"
+#include "ear/odometry.h"
+#include "filter/imu_buffer.h"
 #include "filter/state.h"
 
 namespace ear {
@@ -21,6 +23,12 @@ struct ErrorTransition {
 /// those of the state. Exact for constant inputs.
 [[nodiscard]] ImuState integrate(const ImuState& x, const Eigen::Vector3d& gyro_B, const Eigen::Vector3d& accel_B,
                                  double dt);
+
+/// The state at `t_ns`, carried there by the samples; as it is if that is not later.
+[[nodiscard]] ImuState integrate_to(TimeNs t_ns, ImuState x, const ImuBuffer& samples);
+
+/// The state as users get it.
+[[nodiscard]] NavState nav_state(const ImuState& x);
 
 /// How the error of `x` goes over into that of integrate(x, ...), and the noise that comes in on the way.
 [[nodiscard]] ErrorTransition error_transition(const ImuState& x, const Eigen::Vector3d& gyro_B,

@@ -1,5 +1,7 @@
 #include "filter/state.h"
 
+#include <algorithm>
+
 namespace ear {
 namespace {
 
@@ -33,6 +35,10 @@ Eigen::Vector3d rotation_between(const Eigen::Vector3d& a, const Eigen::Vector3d
 }
 
 }  // namespace
+
+BeamRanges::BeamRanges(const LaserSample& sample) : t_ns(sample.t_ns) {
+  std::copy_n(sample.range.begin(), std::min(sample.range.size(), range.size()), range.begin());
+}
 
 Eigen::Matrix<double, 3, 2> tangent_basis(const Eigen::Vector3d& n) {
   // The shortest turn from z to n, applied to x and y.

@@ -18,6 +18,15 @@ inline const Eigen::Vector3d kGravity_W{0.0, 0.0, -9.81};  ///< [m/s^2]
 /// The most laser beams that a vehicle may have.
 inline constexpr int kMaxBeams = 3;
 
+/// Ranges of one reading of the lasers [m]; NaN without return.
+struct BeamRanges {
+  explicit BeamRanges(const LaserSample& sample);
+  BeamRanges() = default;
+
+  TimeNs t_ns = 0;
+  std::array<double, kMaxBeams> range{};
+};
+
 /// Where each quantity's error stands in the error vector. What wheels and lasers measure lies together, before the
 /// camera's part; that is last, so that its measurements touch one contiguous range too: the calibration of the
 /// cameras, then the clones, oldest first.

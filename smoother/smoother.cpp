@@ -19,10 +19,6 @@ constexpr double kSpinUp = 0.1;            // [s] after a touchdown until the wh
 constexpr double kTakeoffUnseen = 0.1;     // [s] before a take-off is noticed the wheels are wrong
 constexpr double kUnseenSpeed = 1.0;       // [m/s] that the vehicle may have gained since it was lost
 
-double focal_length(const Calibration& calibration) {
-  return 0.5 * (calibration.cameras[0].fu + calibration.cameras[0].fv);
-}
-
 const Calibration& supported(const FilterConfig& config, const Calibration& calibration) {
   if (checked(calibration).cameras.empty()) throw std::invalid_argument("smoother: calibration: cameras are needed");
   const OdometerModel model = config.odometer.model;
@@ -111,11 +107,8 @@ void Smoother::add_laser(const LaserSample& sample) {
   if (!window_) starter_->add_laser(sample);
   if (!encoder_ || guard_.judge(sample, state_time()) != Verdict::accepted) return;
   note_contact(contact_.add_laser(sample));
-  BeamRanges reading;
-  reading.t_ns = sample.t_ns;
-  std::copy(sample.range.begin(), sample.range.end(), reading.range.begin());
   if (ranges_.full()) ranges_.pop();
-  ranges_.push(reading);
+  ranges_.push(BeamRanges(sample));
 }
 
 /// After a change of the ground under the wheels nothing is known of it. A take-off is noticed a moment late.

@@ -62,12 +62,6 @@ class Smoother final : public Estimator {
   [[nodiscard]] OdometerState odometer() const override;
 
  private:
-  /// Ranges of one reading; NaN without return.
-  struct BeamRanges {
-    TimeNs t_ns = 0;
-    std::array<double, kMaxBeams> range{};
-  };
-
   // smoother.cpp
   [[nodiscard]] TimeNs imu_time(TimeNs camera_time_ns) const;
   [[nodiscard]] std::optional<TimeNs> state_time() const;

@@ -23,16 +23,7 @@ Aiding aiding_of(const FrameStatistics& frame) {
 
 }  // namespace
 
-NavState Smoother::predict_here(TimeNs t_ns) const {
-  ImuState x = window_->newest();
-  if (t_ns > x.t_ns) {
-    imu_.for_each_piece(x.t_ns, t_ns, [&](const Eigen::Vector3d& gyro_B, const Eigen::Vector3d& accel_B, double dt) {
-      x = integrate(x, gyro_B, accel_B, dt);
-    });
-    x.t_ns = t_ns;
-  }
-  return NavState{x.t_ns, Eigen::Quaterniond(x.R_WB).normalized(), x.p_WB, x.v_W, x.b_g, x.b_a};
-}
+NavState Smoother::predict_here(TimeNs t_ns) const { return nav_state(integrate_to(t_ns, window_->newest(), imu_)); }
 
 std::optional<NavState> Smoother::predict(TimeNs t_ns) const {
   if (!window_ || !is_time(t_ns) || seconds_between(imu_.newest().t_ns, t_ns) > kLongestPredict) return std::nullopt;
@@ -42,12 +33,7 @@ std::optional<NavState> Smoother::predict(TimeNs t_ns) const {
 std::optional<RelativeMotion> Smoother::motion_to(TimeNs t_ns) const {
   if (!window_) return starter_->motion_to(t_ns);
   if (!is_time(t_ns) || !image_T_WB_ || t_ns <= last_image_ns_) return std::nullopt;
-  const NavState next = predict_here(imu_time(t_ns));
-  RelativeMotion motion;
-  motion.R_B1B0 = next.q_WB.toRotationMatrix().transpose() * image_T_WB_->R;
-  motion.p_B0B1 = image_T_WB_->R.transpose() * (next.p_WB - image_T_WB_->p);
-  motion.translation_known = true;
-  return motion;
+  return motion_between(*image_T_WB_, predict_here(imu_time(t_ns)));
 }
 
 Estimate Smoother::make_estimate() const {

@@ -51,8 +51,7 @@ void LiveState::carry_on(const ImuSample& from, const ImuSample& to) {
 
 std::optional<NavState> LiveState::state() const {
   if (!state_ || age_ > kLongest) return std::nullopt;
-  const ImuState& x = *state_;
-  return NavState{x.t_ns, Eigen::Quaterniond(x.R_WB).normalized(), x.p_WB, x.v_W, x.b_g, x.b_a};
+  return nav_state(*state_);
 }
 
 }  // namespace ear

@@ -3,7 +3,6 @@
 // within the pipeline are wall time, so that they mean something on a machine that is otherwise idle.
 #include <sys/resource.h>
 
-#include <ctime>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
@@ -24,6 +23,7 @@
 #include "tools/bench_figures.h"
 #include "tools/commands.h"
 #include "tools/floor.h"
+#include "tools/processor_time.h"
 #include "tools/replay.h"
 
 namespace ear::tools {
@@ -43,13 +43,13 @@ class Meter {
  public:
   void start() {
     running_ = true;
-    start_seconds_ = thread_cpu_time();
+    start_seconds_ = thread_time();
     start_allocations_ = thread_allocations();
   }
   void stop() {
     if (!running_) return;
     running_ = false;
-    seconds_ += thread_cpu_time() - start_seconds_;
+    seconds_ += thread_time() - start_seconds_;
     allocations_ += thread_allocations() - start_allocations_;
   }
   [[nodiscard]] bool running() const { return running_; }
@@ -69,11 +69,7 @@ class Meter {
 };
 
 /// CPU time of all threads but this one: of those that decode images ahead [s].
-double other_threads_cpu_time() {
-  timespec t{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
-  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec) - thread_cpu_time();
-}
+double other_threads_cpu_time() { return process_time() - thread_time(); }
 
 /// Values of one kind, one per frame.
 class Series {

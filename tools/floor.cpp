@@ -1,8 +1,9 @@
 #include "tools/floor.h"
 
-#include <ctime>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>
+
+#include "tools/processor_time.h"
 
 namespace ear::tools {
 namespace {
@@ -15,12 +16,6 @@ cv::Mat mat_of(const ImageView& image) {
 
 }  // namespace
 
-double thread_cpu_time() {
-  timespec t{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
-}
-
 double Floor::measure(const StereoFrame& frame) {
   const cv::Size window(15, 15);
   constexpr int kLevels = 3;
@@ -29,7 +24,7 @@ double Floor::measure(const StereoFrame& frame) {
   std::vector<cv::Point2f> points;
   if (!last_left_.empty()) cv::goodFeaturesToTrack(last_left_, points, points_, 0.001, 15.0);
 
-  const double start = thread_cpu_time();
+  const double start = thread_time();
   std::vector<cv::Mat> pyramid;
   std::vector<cv::Mat> right_pyramid;
   cv::buildOpticalFlowPyramid(left, pyramid, window, kLevels);
@@ -42,7 +37,7 @@ double Floor::measure(const StereoFrame& frame) {
     cv::calcOpticalFlowPyrLK(last_pyramid_, pyramid, points, tracked, status, error, window, kLevels, criteria);
     cv::calcOpticalFlowPyrLK(pyramid, right_pyramid, tracked, matched, status, error, window, kLevels, criteria);
   }
-  const double seconds = thread_cpu_time() - start;
+  const double seconds = thread_time() - start;
 
   left.copyTo(last_left_);
   last_pyramid_ = std::move(pyramid);

@@ -23,7 +23,4 @@ class Floor {
   std::vector<cv::Mat> last_pyramid_;
 };
 
-/// CPU time of the calling thread [s]: unlike wall time, it does not count what others do on the machine.
-[[nodiscard]] double thread_cpu_time();
-
 }  // namespace ear::tools

@@ -13,8 +13,6 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
-#include <cstdlib>
-#include <iostream>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -23,6 +21,7 @@
 #include "filter/state.h"
 #include "src/health_text.h"
 #include "src/recording/config_file.h"
+#include "tools/benchmarks/program.h"
 #include "tools/experiments/figures.h"
 #include "tools/experiments/in_parallel.h"
 #include "tools/experiments/seeds.h"
@@ -401,7 +400,7 @@ std::vector<simulator::Options> simulations_of(const Arguments& args) {
 
 int parse_and_run(int argc, char** argv) {
   Arguments args;
-  CLI::App app{"fault_table: what faults cost, and what the health says of them and of sound sensors"};
+  CLI::App app{"fault_table: what faults cost, and what the health says of them and of sound sensors", "fault_table"};
   app.add_option("--sequences", args.sequences, "a,b,.. or all")->delimiter(',')->capture_default_str();
   app.add_option("--seeds", args.seeds, "7 or 501..505, several with commas")->delimiter(',')->capture_default_str();
   app.add_option("--faults", args.faults, "one per run, as in ear simulate, the time may be missing; or all")
@@ -415,29 +414,18 @@ int parse_and_run(int argc, char** argv) {
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   app.add_flag("--verbose", args.verbose, "every change of what the health says");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {  // also --help
-    return app.exit(error);
-  }
-  const FilterConfig config = args.config.empty() ? FilterConfig{} : load_config(args.config).filter;
-  const std::vector<simulator::Fault> faults = faults_of(args);
-  if (faults.empty()) {
-    count_alarms(simulations_of(args), config, args);
-  } else {
-    compare_faults(simulations_of(args), faults, config, args);
-  }
-  return EXIT_SUCCESS;
+  return tools::run_program(app, argc, argv, [&] {
+    const FilterConfig config = args.config.empty() ? FilterConfig{} : load_config(args.config).filter;
+    const std::vector<simulator::Fault> faults = faults_of(args);
+    if (faults.empty()) {
+      count_alarms(simulations_of(args), config, args);
+    } else {
+      compare_faults(simulations_of(args), faults, config, args);
+    }
+  });
 }
 
 }  // namespace
 }  // namespace ear::experiments
 
-int main(int argc, char** argv) {
-  try {
-    return ear::experiments::parse_and_run(argc, argv);
-  } catch (const std::exception& error) {
-    std::cerr << "fault_table: " << error.what() << '\n';
-    return EXIT_FAILURE;
-  }
-}
+int main(int argc, char** argv) { return ear::experiments::parse_and_run(argc, argv); }

@@ -7,9 +7,6 @@
 #include <CLI/CLI.hpp>
 #include <cstddef>
 #include <cstdio>
-#include <cstdlib>
-#include <ctime>
-#include <iostream>
 #include <opencv2/core/utility.hpp>
 #include <string>
 #include <vector>
@@ -17,11 +14,13 @@
 #include "ear/odometry.h"
 #include "filter/filter.h"
 #include "src/load_governor.h"
+#include "tools/benchmarks/program.h"
 #include "tools/evaluation/evaluate.h"
 #include "tools/experiments/sample_feed.h"
 #include "tools/experiments/seeds.h"
 #include "tools/experiments/simulation_truth.h"
 #include "tools/experiments/statistics.h"
+#include "tools/processor_time.h"
 #include "tools/simulator/film.h"
 #include "tools/simulator/simulation.h"
 
@@ -82,12 +81,6 @@ double track_error(const simulator::Simulation& simulation, int step) {
   return evaluation::evaluate(estimate, truth.poses, evaluation::AlignmentKind::yaw, truth.terrain).position_rmse;
 }
 
-double cpu_time() {
-  std::timespec time{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
-  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
-}
-
 /// The first seconds of a sequence.
 simulator::Options beginning(const std::string& sequence, double duration) {
   simulator::Options options;
@@ -113,11 +106,11 @@ double cost(const simulator::Film& film, int step) {
   double total = 0.0;
   int frames = 0, since = 0;
   for (const simulator::Delivery& delivery : film.simulation.deliveries()) {
-    const double start = cpu_time();
+    const double start = tools::process_time();
     hand_over(film.simulation, delivery, odometry);
     const bool image = delivery.stream == simulator::SensorStream::camera;
     if (image) odometry.add_stereo(film.frame(delivery.index));
-    const double duration = cpu_time() - start;
+    const double duration = tools::process_time() - start;
     reached = odometry.health().load_step;
     since += image && reached == step ? 1 : 0;
     if (since <= kWarmUp) continue;
@@ -161,29 +154,16 @@ void load_table(const Arguments& args) {
 
 int parse_and_run(int argc, char** argv) {
   Arguments args;
-  CLI::App app{"load_table: what each load step saves, and what it costs in accuracy"};
+  CLI::App app{"load_table: what each load step saves, and what it costs in accuracy", "load_table"};
   app.add_option("--sequences", args.sequences, "a,b,..")->delimiter(',')->capture_default_str();
   app.add_option("--seeds", args.seeds, "7 or 501..505, of the tracks")->delimiter(',')->capture_default_str();
   app.add_option("--images", args.images, "[s] that are rendered of each sequence")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {  // also --help
-    return app.exit(error);
-  }
-  load_table(args);
-  return EXIT_SUCCESS;
+  return tools::run_program(app, argc, argv, [&] { load_table(args); });
 }
 
 }  // namespace
 }  // namespace ear::experiments
 
-int main(int argc, char** argv) {
-  try {
-    return ear::experiments::parse_and_run(argc, argv);
-  } catch (const std::exception& error) {
-    std::cerr << "load_table: " << error.what() << '\n';
-    return EXIT_FAILURE;
-  }
-}
+int main(int argc, char** argv) { return ear::experiments::parse_and_run(argc, argv); }

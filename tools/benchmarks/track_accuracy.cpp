@@ -4,7 +4,6 @@
 //
 // One row of a Markdown table per sequence, camera rate, calibration and configuration file, over all seeds.
 #include <CLI/CLI.hpp>
-#include <cstdlib>
 #include <filesystem>
 #include <iostream>
 #include <map>
@@ -15,6 +14,7 @@
 
 #include "src/recording/config_fields.h"
 #include "src/recording/config_file.h"
+#include "tools/benchmarks/program.h"
 #include "tools/estimators.h"
 #include "tools/evaluation/alignment.h"
 #include "tools/experiments/in_parallel.h"
@@ -159,7 +159,7 @@ int parse_and_run(int argc, char** argv) {
   const std::map<std::string, AlignmentKind> alignments{
       {"se3", AlignmentKind::se3}, {"yaw", AlignmentKind::yaw}, {"none", AlignmentKind::none}};
   Arguments args;
-  CLI::App app{"track_accuracy: accuracy and consistency of the filter on simulated feature tracks"};
+  CLI::App app{"track_accuracy: accuracy and consistency of the filter on simulated feature tracks", "track_accuracy"};
   app.add_option("--sequences", args.sequences, "a,b,.. or all")->delimiter(',')->capture_default_str();
   app.add_option("--seeds", args.seeds, "7 or 501..505, several with commas")->delimiter(',')->capture_default_str();
   app.add_option("--calibration", args.calibration, "that the filter is told")
@@ -195,23 +195,10 @@ int parse_and_run(int argc, char** argv) {
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   app.add_flag("--json", args.json, "every run's figures as JSON instead of a table");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {  // also --help
-    return app.exit(error);
-  }
-  track_accuracy(args);
-  return EXIT_SUCCESS;
+  return tools::run_program(app, argc, argv, [&] { track_accuracy(args); });
 }
 
 }  // namespace
 }  // namespace ear::experiments
 
-int main(int argc, char** argv) {
-  try {
-    return ear::experiments::parse_and_run(argc, argv);
-  } catch (const std::exception& error) {
-    std::cerr << "track_accuracy: " << error.what() << '\n';
-    return EXIT_FAILURE;
-  }
-}
+int main(int argc, char** argv) { return ear::experiments::parse_and_run(argc, argv); }

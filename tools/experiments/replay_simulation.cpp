@@ -1,23 +1,12 @@
 #include "tools/experiments/replay_simulation.h"
 
-#include <time.h>
-
 #include <optional>
 
 #include "tools/blind_steps.h"
 #include "tools/experiments/sample_feed.h"
+#include "tools/processor_time.h"
 
 namespace ear::experiments {
-namespace {
-
-/// Of this thread [s].
-double processor_time() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
-
-}  // namespace
 
 void replay(const simulator::Simulation& simulation, Estimator& estimator, const OnEstimate& on_estimate,
             const ReplayOptions& options) {
@@ -26,9 +15,9 @@ void replay(const simulator::Simulation& simulation, Estimator& estimator, const
     if (estimate) on_estimate(stamp_ns, *estimate);
   };
   const auto timed = [&](const auto& call) {
-    const double start = options.processor_time != nullptr ? processor_time() : 0.0;
+    const double start = options.processor_time != nullptr ? tools::thread_time() : 0.0;
     call();
-    if (options.processor_time != nullptr) *options.processor_time += processor_time() - start;
+    if (options.processor_time != nullptr) *options.processor_time += tools::thread_time() - start;
   };
   for (const simulator::Delivery& delivery : simulation.deliveries()) {
     timed([&] {

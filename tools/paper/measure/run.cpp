@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 #include <memory>
 #include <stdexcept>
 #include <vector>
@@ -15,19 +14,13 @@
 #include "tools/experiments/replay_simulation.h"
 #include "tools/experiments/simulation_truth.h"
 #include "tools/paper/measure/changed_samples.h"
+#include "tools/processor_time.h"
 #include "tools/replay.h"
 
 namespace ear::paper {
 namespace {
 
 constexpr double kDegPerRad = 180.0 / M_PI;
-
-/// Processor time of the calling thread [s]: what runs beside it does not count.
-double thread_time() {
-  std::timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
 
 /// What is collected while the estimator runs.
 struct Record {
@@ -110,9 +103,11 @@ Result run_on_tracks(const simulator::Simulation& simulation, const Configuratio
   if (!configuration.pitch_rate) options.change_encoder = WithoutPitch(simulation, calibration);
   if (configuration.beams_together) options.change_laser = together;
   double begin = 0.0;
-  options.change = [&](FeatureFrame&) { begin = thread_time(); };  // the last thing before the estimator has the frame
+  options.change = [&](FeatureFrame&) {
+    begin = tools::thread_time();
+  };  // the last thing before the estimator has the frame
   options.after = [&](const simulator::Delivery& delivery) {
-    if (delivery.stream == simulator::SensorStream::camera) record.frame_times.push_back(thread_time() - begin);
+    if (delivery.stream == simulator::SensorStream::camera) record.frame_times.push_back(tools::thread_time() - begin);
   };
   experiments::replay(
       simulation, *estimator, [&](TimeNs, const Estimate& estimate) { record.add(estimate); }, options);
@@ -130,9 +125,11 @@ Result run_on_images(const std::filesystem::path& recording, double camera_rate_
   Odometry odometry(configuration.config, told(configuration, samples.calibration()), maker_of(configuration));
   Record record;
   double begin = 0.0;
-  const auto before_sample = [&](const Sample&) { begin = thread_time(); };  // a frame goes with the sample after it
+  const auto before_sample = [&](const Sample&) {
+    begin = tools::thread_time();
+  };  // a frame goes with the sample after it
   const auto on_frame = [&](const tools::ReplayedFrame& frame) {
-    record.frame_times.push_back(thread_time() - begin);
+    record.frame_times.push_back(tools::thread_time() - begin);
     if (frame.estimate) record.add(*frame.estimate);
   };
   tools::replay(samples, odometry, on_frame, before_sample);
