@@ -189,6 +189,7 @@ class Filter final : public Estimator {
   [[nodiscard]] FrameAgreement check_frame(const FeatureFrame& frame);
   void go_on_blind(bool still);
   void use_image(const FeatureFrame& frame, bool still);
+  void note_features_used();
   void log_features();
   void hold_still();
   void append_clone();
@@ -248,6 +249,8 @@ class Filter final : public Estimator {
   FeatureFrame last_features_;                              ///< its features
   bool any_image_ = false;
   bool noiseless_camera_ = false;   ///< its images repeat while nothing moves: that means nothing
+  TimeNs fed_ns_ = 0;               ///< when features last told enough of where the vehicle is
+  int fed_features_ = 0;            ///< used since then
   bool clone_is_here_ = false;      ///< the newest clone was made where the vehicle is, if it stands
   bool learn_calibration_ = false;  ///< standing tells nothing about it
   FrameStatistics statistics_;

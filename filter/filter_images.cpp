@@ -17,6 +17,8 @@ constexpr double kFeigned = 3.0;            // standard deviations of the camera
 constexpr double kOldImage = 0.5;           // [s] after which frames have little in common
 constexpr double kNoisy = 1.25;             // times the usual standard deviation of a feature: less may be chance
 constexpr double kNegligible = 1e-4;  // see FeatureInformation: in all 2e-4 of what a frame tells, in 12 % of the rows
+constexpr int kFeed = 10;             // features used, that tell enough of where the vehicle is
+constexpr double kStarved = 0.6;      // [s] so long it may do without
 constexpr std::size_t kMinObservations = 2;  // clones that must have seen a feature
 
 }  // namespace
@@ -141,6 +143,7 @@ void Filter::go_on_blind(bool still) {
 
 /// The vehicle is where it was at the newest clone, and its velocity is zero. docs/filter.md, section 4.
 void Filter::hold_still() {
+  fed_ns_ = state_.imu.t_ns;
   statistics_.standing = true;
   const StandstillConfig& still = config_.standstill;
   const ImuState& x = state_.imu;
@@ -173,13 +176,14 @@ void Filter::append_clone() {
   Eigen::Matrix<double, 6, 1> J_offset;  // the frame was taken a moment later than thought: the vehicle moved on
   J_offset << rate_W, x.v_W + x.p_WB.cross(rate_W);
   covariance_.append_clone(J_imu, J_offset);
-  state_.clones.push_back({next_frame_++, {x.R_WB, x.p_WB}, feature_noise_ / trust(MotionSensor::camera), x.t_ns});
+  state_.clones.push_back({next_frame_++, {x.R_WB, x.p_WB}, feature_noise_ / trust(MotionSensor::camera)});
   learn_calibration_ = !monitor_.health().untrusted[index_of(Source::camera_left)];
   clone_is_here_ = true;
 }
 
 void Filter::make_room(std::optional<std::size_t> leaving) {
   if (!leaving) return;
+  if (*leaving == 0) fed_ns_ = state_.imu.t_ns;  // with all that reached back to it
   tracks_.forget_frame(state_.clones[*leaving].frame);
   covariance_.remove(err::clone(static_cast<int>(*leaving)), err::clone_size);
   state_.clones.erase(state_.clones.begin() + static_cast<std::ptrdiff_t>(*leaving));
@@ -197,6 +201,7 @@ void Filter::update_with_features(const FeatureFrame& frame, std::optional<std::
     ++(add_track(tracks_[i]) ? statistics_.features_used : statistics_.features_rejected);
     tracks_[i].observations.clear();  // each observation is used once
   }
+  note_features_used();
   log_features();
   information_.compress(kNegligible);
   if (information_.residual().size() > 0) update(information_.H(), err::camera, information_.residual(), true);
@@ -205,6 +210,13 @@ void Filter::update_with_features(const FeatureFrame& frame, std::optional<std::
   tracks_.keep_if([&](const Track& track) {
     return !track.observations.empty() && std::binary_search(frame_ids_.begin(), frame_ids_.end(), track.id);
   });
+}
+
+void Filter::note_features_used() {
+  fed_features_ += statistics_.features_used;
+  if (fed_features_ < kFeed) return;
+  fed_features_ = 0;
+  fed_ns_ = state_.imu.t_ns;
 }
 
 /// What both cameras saw of this frame's features, against where they were found to be.
@@ -275,8 +287,8 @@ void Filter::add_observation(int clone, std::size_t camera, const InverseDepthPo
 /// With a full window, the clone before the newest goes if it shows little that its elder does not; else the oldest.
 /// Turning on the spot thus fills no window with copies. Where all of the window shows one place, as while a vehicle
 /// shakes on its legs, there is nothing to keep, and the oldest goes: tracks are only used when they end or it leaves.
-/// Neither may happen for long where a vehicle sways to and fro and sees the same all the time: so the oldest goes when
-/// it is old.
+/// Neither may happen for long where a vehicle sways to and fro and sees the same all the time: then the oldest goes
+/// too.
 std::optional<std::size_t> Filter::clone_to_leave() const {
   const std::size_t n = state_.clones.size();
   if (n <= window_) return std::nullopt;
@@ -284,8 +296,8 @@ std::optional<std::size_t> Filter::clone_to_leave() const {
     return median_parallax_px(a, b) < config_.keyframe_parallax_px;
   };
   const bool copy = same_place(state_.clones[n - 3], state_.clones[n - 2]);
-  const bool old = seconds_between(state_.clones.front().t_ns, state_.imu.t_ns) > config_.window_duration;
-  return copy && !old && !same_place(state_.clones.front(), state_.clones.back()) ? n - 2 : 0;
+  const bool starved = seconds_between(fed_ns_, state_.imu.t_ns) > kStarved;
+  return copy && !starved && !same_place(state_.clones.front(), state_.clones.back()) ? n - 2 : 0;
 }
 
 double Filter::median_parallax_px(const Clone& from, const Clone& to) const {

@@ -21,7 +21,6 @@ const FilterConfig& checked(const FilterConfig& config) {
   require(config.window <= 60, "filter.window: at most 60 clones");
   require(config.max_track_updates >= 1, "filter.max_track_updates: at least 1");
   require(config.max_track_updates <= 1000, "filter.max_track_updates: at most 1000");
-  require(config.window_duration > 0.0, "filter.window_duration: must be positive");
   require(config.feature_sigma_px > 0.0, "filter.feature_sigma_px: must be positive");
   require(config.huber_px > 0.0, "filter.huber_px: must be positive");
   require(config.gate_probability > 0.0 && config.gate_probability < 1.0, "filter.gate_probability: between 0 and 1");

@@ -89,7 +89,6 @@ struct Clone {
   std::uint64_t frame = 0;  ///< number of the frame, never used again
   Pose T_WB;
   double feature_noise = 1.0;  ///< standard deviation of what was seen from it, times the usual
-  TimeNs t_ns = 0;             ///< IMU time at which it was made
 };
 
 struct State {

@@ -126,7 +126,6 @@ struct FilterConfig {
   double huber_px = 1.5;               ///< observations further off than this weigh less [px]
   double gate_probability = 0.997;     ///< chi-square gate of every feature and row
   double keyframe_parallax_px = 12.0;  ///< a clone with less median parallax to its elder makes room first [px]
-  double window_duration = 2.2;        ///< an older clone makes room all the same [s]
   double max_imu_gap = 0.05;           ///< [s] a longer hole in the IMU data is bridged, counted, and its noise raised
   PriorConfig prior;
   StandstillConfig standstill;

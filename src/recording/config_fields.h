@@ -157,7 +157,6 @@ EnableFor<C, FilterConfig> visit(C& c, F&& f) {
   f("huber_px", c.huber_px);
   f("gate_probability", c.gate_probability);
   f("keyframe_parallax_px", c.keyframe_parallax_px);
-  f("window_duration", c.window_duration);
   f("max_imu_gap", c.max_imu_gap);
   f("prior", c.prior);
   f("standstill", c.standstill);

@@ -47,7 +47,6 @@ std::vector<Configuration> left_out() {
       with("displacement", "displacement update",
            [](Config& c) { c.filter.odometer.update = OdometerUpdate::displacement; }),
       with("oldest-clone", "oldest clone makes room", [](Config& c) { c.filter.keyframe_parallax_px = 0.0; }),
-      with("any-age", "clones of any age", [](Config& c) { c.filter.window_duration = 1e9; }),
   };
   Configuration no_pitch_rate = with("no-pitch-rate", "no pitch-rate correction", [](Config&) {});
   no_pitch_rate.pitch_rate = false;
@@ -112,9 +111,9 @@ const std::vector<Configuration>& configurations() {
 
 const std::vector<std::string>& ablation() {
   static const std::vector<std::string> names{
-      "default",      "none",        "no-pitch-rate",       "no-lasers",        "beams-together",
-      "no-side-slip", "weights-off", "weights-mahalanobis", "weights-distance", "displacement",
-      "oldest-clone", "any-age",     "no-prediction"};
+      "default",          "none",         "no-pitch-rate", "no-lasers",
+      "beams-together",   "no-side-slip", "weights-off",   "weights-mahalanobis",
+      "weights-distance", "displacement", "oldest-clone",  "no-prediction"};
   return names;
 }
 
