@@ -4,7 +4,7 @@
 
 #include <Eigen/Core>
 
-#include "ear/odometry.h"
+#include "ear/estimate.h"
 
 namespace ear {
 

@@ -5,8 +5,8 @@
 #include <Eigen/Core>
 #include <array>
 
+#include "ear/estimate.h"
 #include "ear/filter_config.h"
-#include "ear/odometry.h"
 #include "filter/chi_squared.h"
 
 namespace ear {

@@ -5,7 +5,7 @@ namespace ear {
 WheelModel wheel_model(const OdometerState& odometer) {
   WheelModel wheels;
   wheels.radius = odometer.wheel_radius;
-  wheels.separation = odometer.wheel_separation;
+  wheels.track_width = odometer.track_width;
   wheels.y_B = odometer.T_BO.R.col(1);
   return wheels;
 }
@@ -21,7 +21,7 @@ DisplacementRows linearize_displacement(const State& x, int i, const WheelDispla
   const Eigen::Vector3d alpha_Bi =
       z.alpha_Bi + z.J_alpha_bias * (x.imu.b_g - z.b_g) + z.J_alpha_normal * (n_Bi - z.n_Bi) +
       z.J_alpha_radius * (wheels.radius.cwiseQuotient(z.wheels.radius) - Eigen::Vector2d::Ones()) +
-      z.J_alpha_separation * (wheels.separation / z.wheels.separation - 1.0) +
+      z.J_alpha_track_width * (wheels.track_width / z.wheels.track_width - 1.0) +
       z.J_alpha_axle * (wheels.y_B - z.wheels.y_B);
 
   DisplacementRows rows;
@@ -37,7 +37,7 @@ DisplacementRows linearize_displacement(const State& x, int i, const WheelDispla
   rows.H.middleCols<3>(err::b_g) = -z.J_alpha_bias;
   rows.H.middleCols<2>(err::normal) = -J_alpha_turn * tangent_basis(x.ground.n_W);
   rows.H.middleCols<2>(err::wheel_radius) = -z.J_alpha_radius;
-  rows.H.col(err::wheel_separation) = -z.J_alpha_separation;
+  rows.H.col(err::track_width) = -z.J_alpha_track_width;
   rows.H.middleCols<3>(err::odometer) = z.J_alpha_axle * x.odometer.T_BO.R * skew(Eigen::Vector3d::UnitY());
   rows.H_clone << -H_theta, -R_BiW;
   return rows;

@@ -8,7 +8,7 @@
 namespace ear {
 namespace {
 
-constexpr TimeNs kMissedReading = 50'000'000;  // [ns] without wheel readings: the displacement has a hole
+constexpr TimeNs kMissedReading = 50'000'000;  // [ns] without wheel readings: the displacement has a gap
 
 double squared(double value) { return value * value; }
 
@@ -17,7 +17,7 @@ bool integrate_turns(const TurnsBetween& turns, const ImuBuffer& samples, TimeNs
                      WheelPreintegration& wheels) {
   TimeNs now_ns = from_ns;
   for (std::size_t i = 0; i < turns.size() && now_ns < to_ns; ++i) {
-    const WheelTurn& turn = turns[i];
+    const WheelIncrement& turn = turns[i];
     const bool last = i + 1 == turns.size();
     if (turn.to_ns <= now_ns && !last) continue;
     if (turn.from_ns > now_ns + kMissedReading || (last && to_ns > turn.to_ns + kMissedReading)) return false;
@@ -122,7 +122,7 @@ Displacement wheel_displacement(const State& x, const Covariance& P, const Turns
   Eigen::Matrix<double, 3, err::camera> H = Eigen::Matrix<double, 3, err::camera>::Zero();
   H.middleCols<3>(err::b_g) = z.J_alpha_bias + skew(z.R_BiBj * odometer.T_BO.p) * z.J_xi_bias;
   H.middleCols<2>(err::wheel_radius) = z.J_alpha_radius;
-  H.col(err::wheel_separation) = z.J_alpha_separation;
+  H.col(err::track_width) = z.J_alpha_track_width;
   H.middleCols<3>(err::odometer) = -z.J_alpha_axle * odometer.T_BO.R * skew(Eigen::Vector3d::UnitY());
   if (setting.on_plane) {
     H.middleCols<2>(err::normal) = -z.J_alpha_normal * skew(n_B) * R_BW * tangent_basis(x.ground.n_W);

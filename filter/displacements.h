@@ -49,17 +49,17 @@ struct WheelSetting {
 /// Turns of the wheels in time order: one that the state has passed, if there is one, and those to come.
 class TurnsBetween {
  public:
-  TurnsBetween(const std::optional<WheelTurn>& passed, const Ring<WheelTurn>& coming)
+  TurnsBetween(const std::optional<WheelIncrement>& passed, const Ring<WheelIncrement>& coming)
       : passed_(passed), coming_(coming) {}
   [[nodiscard]] std::size_t size() const { return coming_.size() + (passed_ ? 1 : 0); }
-  [[nodiscard]] const WheelTurn& operator[](std::size_t i) const {
+  [[nodiscard]] const WheelIncrement& operator[](std::size_t i) const {
     if (!passed_) return coming_[i];
     return i == 0 ? *passed_ : coming_[i - 1];
   }
 
  private:
-  const std::optional<WheelTurn>& passed_;
-  const Ring<WheelTurn>& coming_;
+  const std::optional<WheelIncrement>& passed_;
+  const Ring<WheelIncrement>& coming_;
 };
 
 /// From x.imu.t_ns to `to_ns`. Readings do not come when frames do: a turn is shared out in proportion, the last one

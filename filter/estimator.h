@@ -4,7 +4,7 @@
 #include <Eigen/Core>
 #include <optional>
 
-#include "ear/odometry.h"
+#include "ear/estimate.h"
 #include "ear/types.h"
 #include "filter/state.h"
 

@@ -96,10 +96,10 @@ void Filter::add_imu(const ImuSample& sample) {
 }
 
 void Filter::hear(ImuClock::Stream stream, TimeNs t_ns) {
-  const int mended = clocks_.imu.leaps_mended();
+  const int mended = clocks_.imu.jumps_corrected();
   clocks_.imu.hear(stream, t_ns);
   take_waiting_imu();
-  if (clocks_.imu.leaps_mended() != mended) monitor_.accuse_imu(true, true, imu_.newest().t_ns);
+  if (clocks_.imu.jumps_corrected() != mended) monitor_.accuse_imu(true, true, imu_.newest().t_ns);
 }
 
 void Filter::take_waiting_imu() {
@@ -121,7 +121,7 @@ void Filter::take_imu(const ImuSample& sample) {
   if (verdict.begins_anew) restart(sample.t_ns, verdict.clock_shift);
   monitor_.add_imu(sample, config_.max_imu_gap);
   if (!imu_.empty() && verdict.unseen > config_.max_imu_gap) {
-    imu_hole_ = ImuHole{imu_.newest().t_ns, sample.t_ns, verdict.unseen};
+    imu_gap_ = ImuGap{imu_.newest().t_ns, sample.t_ns, verdict.unseen};
   }
   // Without frames for long, the state moves on before its samples are overwritten.
   if (status_ == Status::tracking && imu_.size() == kImuCapacity && state_.imu.t_ns < imu_[kImuCapacity / 2].t_ns) {
@@ -148,7 +148,7 @@ void Filter::add_encoder(const EncoderSample& given) {
   if (!imu_.empty()) monitor_.add_encoder(sample, verdict, imu_.newest().t_ns);
   if (verdict != Verdict::accepted) return;
   note_contact(contact_.add_encoder(sample));
-  const std::optional<WheelTurn> turn = encoder_->add(sample);
+  const std::optional<WheelIncrement> turn = encoder_->add(sample);
   if (!turn) return;
   wheel_rest_.add(*turn);
   if (status_ == Status::tracking) {
@@ -277,15 +277,15 @@ bool Filter::possible() const {
   const auto P = covariance_.matrix();
   const bool finite = x.R_WB.allFinite() && x.p_WB.allFinite() && x.v_W.allFinite() && x.b_g.allFinite() &&
                       x.b_a.allFinite() && state_.camera.T_BC0.R.allFinite() && state_.camera.T_BC0.p.allFinite() &&
-                      o.wheel_radius.allFinite() && std::isfinite(o.wheel_separation) && o.T_BO.R.allFinite() &&
+                      o.wheel_radius.allFinite() && std::isfinite(o.track_width) && o.T_BO.R.allFinite() &&
                       state_.ground.n_W.allFinite() && std::isfinite(P.sum());  // one that is not makes the sum so
   return finite && P.diagonal().minCoeff() >= 0.0;
 }
 
 InputCounts Filter::input_counts() const {
   InputCounts counts = guard_.counts();
-  counts.clock_leaps =
-      static_cast<std::uint64_t>(clocks_.imu.leaps_mended() + clocks_.encoder.leaps() + clocks_.camera.leaps());
+  counts.clock_jumps =
+      static_cast<std::uint64_t>(clocks_.imu.jumps_corrected() + clocks_.encoder.jumps() + clocks_.camera.jumps());
   return counts;
 }
 

@@ -15,8 +15,8 @@
 #include <vector>
 
 #include "ear/calibration.h"
+#include "ear/estimate.h"
 #include "ear/filter_config.h"
-#include "ear/odometry.h"
 #include "ear/types.h"
 #include "filter/anchor.h"
 #include "filter/bias_watch.h"
@@ -53,7 +53,7 @@ class Filter final : public Estimator {
   Filter(const FilterConfig& config, const Calibration& calibration);
 
   /// Takes a sample in time order. One that is not finite, implausible or not later than the one before is refused and
-  /// counted. Its stamps are the clock: after a hole of 2 s, or when they go on from an earlier time, all begins anew.
+  /// counted. Its stamps are the clock: after a gap of 2 s, or when they go on from an earlier time, all begins anew.
   void add_imu(const ImuSample& sample) override;
 
   /// Takes a reading in time order; it is used at its own time when the state passes it. One that is not later than the
@@ -66,7 +66,7 @@ class Filter final : public Estimator {
   /// the start only the rotation is known. Nothing if no frame came yet, or no samples.
   [[nodiscard]] std::optional<RelativeMotion> motion_to(TimeNs t_ns) const override;
 
-  /// A camera's stamp by the common clock, should the camera's own have leapt; nothing for a frame that is not to be
+  /// A camera's stamp by the common clock, should the camera's own have jumped; nothing for a frame that is not to be
   /// used, as this is not known yet. For who has the stamps as the driver gives them, once for each frame as it comes.
   [[nodiscard]] std::optional<TimeNs> common_stamp(TimeNs camera_stamp_ns) override;
 
@@ -106,7 +106,7 @@ class Filter final : public Estimator {
   };
 
   /// Where no inertial samples are, though time passed: a gap, or a clock that jumped.
-  struct ImuHole {
+  struct ImuGap {
     TimeNs from_ns = 0;
     TimeNs to_ns = 0;      ///< at once, if the clock jumped back
     double unseen = 0.0;   ///< [s] that passed
@@ -155,7 +155,7 @@ class Filter final : public Estimator {
 
   // filter_motion.cpp
   void mend_spike(const ImuSample& next);
-  void doubt_imu_hole();
+  void doubt_imu_gap();
   void doubt_imu();
   void doubt_motion(double rotation, double velocity, double position);
   void watch_biases(double dt);
@@ -172,8 +172,8 @@ class Filter final : public Estimator {
   void log_wheels(const WheelRows& rows, const Eigen::Matrix<double, WheelRows::size, 1>& sigma, TimeNs t_ns);
   void note_contact(ContactEvent event);
   [[nodiscard]] bool rolls_at(TimeNs t_ns) const;
-  void update_with_wheels(const WheelTurn& turn);
-  bool choose_wheels(WheelRows& rows, Eigen::Vector4d& sigma, const WheelTurn& turn);
+  void update_with_wheels(const WheelIncrement& turn);
+  bool choose_wheels(WheelRows& rows, Eigen::Vector4d& sigma, const WheelIncrement& turn);
   void start_displacement();
   void add_to_displacement(TimeNs until_ns);
   void update_with_displacement();
@@ -215,21 +215,21 @@ class Filter final : public Estimator {
   ImuBuffer imu_;
   InputGuard guard_;
   ImpactGuard impact_guard_;
-  std::optional<ImuHole> imu_hole_;          ///< ahead of the state, or around it
+  std::optional<ImuGap> imu_gap_;            ///< ahead of the state, or around it
   std::optional<TimeNs> doubtful_since_ns_;  ///< inertial samples since the last image may be wrong by more than noise
   std::optional<TimeNs> bridged_ns_;         ///< when images last did
   BiasWatch bias_watch_;
   TimeNs watched_ns_ = 0;                             ///< when it last judged
   Eigen::Vector3d rate_B_ = Eigen::Vector3d::Zero();  ///< mean rate of the last piece integrated, bias removed [rad/s]
   std::optional<EncoderReader> encoder_;
-  Ring<WheelTurn> turns_;                            ///< not yet passed by the state
+  Ring<WheelIncrement> turns_;                       ///< not yet passed by the state
   Ring<BeamRanges> ranges_;                          ///< the same
-  std::optional<WheelTurn> passed_turn_;             ///< the last one that was
+  std::optional<WheelIncrement> passed_turn_;        ///< the last one that was
   bool ground_known_ = false;                        ///< the lasers saw the ground since it was last touched
   int misplaced_grounds_ = 0;                        ///< readings in a row whose plane the wheels do not stand on
   int leaning_readings_ = 0;                         ///< readings in a row with an axle that does not lie along it
   std::optional<WheelPreintegration> displacement_;  ///< since the newest clone
-  Ring<WheelTurn> displacement_turns_;               ///< not yet used up by it
+  Ring<WheelIncrement> displacement_turns_;          ///< not yet used up by it
   TimeNs displacement_ns_ = 0;                       ///< up to where it goes
   ContactDetector contact_;
   std::array<TimeNs, WheelRows::size> agrees_since_ns_{};  ///< each row of the odometer with the state; kDisagrees

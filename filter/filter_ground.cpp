@@ -19,7 +19,7 @@ constexpr double kDoubtTime = 0.5;             // [s] the contradiction of two w
 constexpr double kLevelOff = 0.05;             // [m] of a plane from the wheels that stand on it
 constexpr double kLeanOff = 0.2;               // sine of the axle's angle to it
 constexpr int kPatience = 25;                  // readings of the lasers
-constexpr TimeNs kMissedReading = 50'000'000;  // [ns] without wheel readings: a displacement has a hole
+constexpr TimeNs kMissedReading = 50'000'000;  // [ns] without wheel readings: a displacement has a gap
 
 }  // namespace
 
@@ -47,7 +47,7 @@ Displacement Filter::displacement_by_wheels(TimeNs until_ns) const {
   return wheel_displacement(state_, covariance_, TurnsBetween(passed_turn_, turns_), imu_, until_ns, setting);
 }
 
-void Filter::update_with_wheels(const WheelTurn& turn) {
+void Filter::update_with_wheels(const WheelIncrement& turn) {
   if (!rolls_at(turn.from_ns)) return;
   const OdometerConfig& odometer = config_.odometer;
   const double dt = turn.duration();
@@ -75,7 +75,7 @@ void Filter::update_with_wheels(const WheelTurn& turn) {
       root_sum(WheelRows::side, {floor, odometer.side_slip * per_root_metre, odometer.side_slip_turn * yaw_rate,
                                  odometer.body_yaw * sway}),
       root_sum(WheelRows::slope, {floor, odometer.roughness * per_root_metre, odometer.body_pitch * sway}),
-      root_sum(WheelRows::yaw_rate, {odometer.yaw_rate_sigma, count_noise * 2.0 / state_.odometer.wheel_separation});
+      root_sum(WheelRows::yaw_rate, {odometer.yaw_rate_sigma, count_noise * 2.0 / state_.odometer.track_width});
   log_wheels(rows, sigma, turn.to_ns);
 
   // Without lasers, roll and the gyroscope's bias are told apart by nothing else: both turn the path sideways.
@@ -107,8 +107,8 @@ void Filter::update_with_wheels(const WheelTurn& turn) {
 
 /// Where the wheels contradict each other by the gyroscope, the one that agrees with the state tells the speed. False
 /// if none does. If both do, it lies somewhere between them. docs/filter.md, section 8.
-bool Filter::choose_wheels(WheelRows& rows, Eigen::Vector4d& sigma, const WheelTurn& turn) {
-  const double half = 0.5 * state_.odometer.wheel_separation;
+bool Filter::choose_wheels(WheelRows& rows, Eigen::Vector4d& sigma, const WheelIncrement& turn) {
+  const double half = 0.5 * state_.odometer.track_width;
   const bool agreed = wheel_agreement_.agree();
   wheel_agreement_.add(2.0 * half * rows.residual(WheelRows::yaw_rate),
                        2.0 * half * std::sqrt(covariance_.variance(rows.H.row(WheelRows::yaw_rate), err::nu)),
@@ -142,7 +142,7 @@ bool Filter::choose_wheels(WheelRows& rows, Eigen::Vector4d& sigma, const WheelT
 
 /// Each wheel by itself: the axle's speed and turn tell how fast it should roll.
 void Filter::log_wheels(const WheelRows& rows, const Eigen::Matrix<double, WheelRows::size, 1>& sigma, TimeNs t_ns) {
-  const double lever = 0.5 * state_.odometer.wheel_separation;
+  const double lever = 0.5 * state_.odometer.track_width;
   for (const Source wheel : {Source::wheel_left, Source::wheel_right}) {
     const double side = wheel == Source::wheel_left ? -lever : lever;
     const Eigen::Matrix<double, 1, kGroundColumns> H =
@@ -165,7 +165,7 @@ void Filter::start_displacement() {
 /// Readings do not come when frames do: an interval is shared out in proportion, the last one goes on as it was.
 void Filter::add_to_displacement(TimeNs until_ns) {
   while (displacement_ && displacement_ns_ < until_ns && !displacement_turns_.empty()) {
-    const WheelTurn& turn = displacement_turns_.front();
+    const WheelIncrement& turn = displacement_turns_.front();
     if (turn.to_ns <= displacement_ns_ && displacement_turns_.size() > 1) {
       displacement_turns_.pop();
       continue;
@@ -248,7 +248,7 @@ void Filter::update_with_beams(const BeamRanges& reading) {
     r(count++) = residual / sigma;
   }
   const AxlePrediction axle = predict_axle(state_, motion.R_WB);
-  const double axle_sigma = std::sqrt(2.0) * config_.odometer.unevenness / state_.odometer.wheel_separation;
+  const double axle_sigma = std::sqrt(2.0) * config_.odometer.unevenness / state_.odometer.track_width;
   auto h = H.row(count);
   h.setZero();
   h.segment<2>(ground_column(err::normal)) = axle.H_normal;

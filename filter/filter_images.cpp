@@ -177,7 +177,7 @@ void Filter::append_clone() {
   J_offset << rate_W, x.v_W + x.p_WB.cross(rate_W);
   covariance_.append_clone(J_imu, J_offset);
   state_.clones.push_back({next_frame_++, {x.R_WB, x.p_WB}, feature_noise_ / trust(MotionSensor::camera)});
-  learn_calibration_ = !monitor_.health().untrusted[index_of(Source::camera_left)];
+  learn_calibration_ = !monitor_.health().faulty[index_of(Source::camera_left)];
   clone_is_here_ = true;
 }
 

@@ -10,8 +10,8 @@ constexpr double kAccelSpike = 25.0;      // [m/s^2] of one sample from the mean
 constexpr double kGyroSpike = 2.0;        // [rad/s] the same
 constexpr double kSpikeRatio = 4.0;       // and so many times the difference of these
 constexpr double kGapNoiseFactor = 10.0;  // on the noise densities while a gap in the IMU data is bridged
-constexpr double kHoleAccel = 1.0;        // [m/s^2] while nothing was measured
-constexpr double kHoleRate = 0.3;         // [rad/s] the same
+constexpr double kGapAccel = 1.0;         // [m/s^2] while nothing was measured
+constexpr double kGapRate = 0.3;          // [rad/s] the same
 constexpr double kDoubtfulTurn = 5e-3;    // [rad] standard deviation of what one inertial sample adds
 constexpr double kSettles = 0.07;         // [s] after a bridge
 constexpr double kImageSoon = 0.25;       // [s] so long readings wait for one
@@ -60,7 +60,7 @@ void Filter::advance(TimeNs t_ns) {
         noise.gyro_noise *= factors.gyro;
         noise.accel_noise *= factors.accel / trust(MotionSensor::imu);
         if (noise.gyro_noise * std::sqrt(dt) > kDoubtfulTurn) doubt_imu();
-        if (imu_hole_ && state_.imu.t_ns >= imu_hole_->from_ns) {
+        if (imu_gap_ && state_.imu.t_ns >= imu_gap_->from_ns) {
           noise.gyro_noise *= kGapNoiseFactor;
           noise.accel_noise *= kGapNoiseFactor;
         }
@@ -72,22 +72,22 @@ void Filter::advance(TimeNs t_ns) {
   const double walk = config_.odometer.normal_walk;
   const double distance = encoder_ ? state_.imu.v_W.norm() * duration : 0.0;
   covariance_.propagate(total, tangent_basis(state_.ground.n_W), walk * walk * distance);
-  doubt_imu_hole();
+  doubt_imu_gap();
 }
 
 /// Where samples are missing, they may be lost, or the clock jumped: the vehicle went on meanwhile, or it did not. What
 /// it did, it did all the time: the standard deviations grow with the time.
-void Filter::doubt_imu_hole() {
-  if (!imu_hole_ || state_.imu.t_ns <= imu_hole_->from_ns) return;
-  ImuHole& hole = *imu_hole_;
-  const bool over = state_.imu.t_ns >= hole.to_ns;
+void Filter::doubt_imu_gap() {
+  if (!imu_gap_ || state_.imu.t_ns <= imu_gap_->from_ns) return;
+  ImuGap& gap = *imu_gap_;
+  const bool over = state_.imu.t_ns >= gap.to_ns;
   const double share =
-      over ? 1.0 : seconds_between(hole.from_ns, state_.imu.t_ns) / seconds_between(hole.from_ns, hole.to_ns);
-  const double T = hole.unseen * std::sqrt(share * share - hole.doubted * hole.doubted);
-  hole.doubted = share;
-  if (over) imu_hole_.reset();
+      over ? 1.0 : seconds_between(gap.from_ns, state_.imu.t_ns) / seconds_between(gap.from_ns, gap.to_ns);
+  const double T = gap.unseen * std::sqrt(share * share - gap.doubted * gap.doubted);
+  gap.doubted = share;
+  if (over) imu_gap_.reset();
   doubt_imu();
-  doubt_motion(T * std::hypot(rate_B_.norm(), kHoleRate), kHoleAccel * T, T * state_.imu.v_W.norm());
+  doubt_motion(T * std::hypot(rate_B_.norm(), kGapRate), kGapAccel * T, T * state_.imu.v_W.norm());
 }
 
 /// Samples since the last image may be wrong by more than noise.
@@ -100,7 +100,7 @@ void Filter::doubt_imu() {
 bool Filter::waits_for_bridge() const {
   if (!any_image_ || calibration_.cameras.size() < 2) return false;
   const auto since = [this](TimeNs t_ns) { return seconds_between(t_ns, state_.imu.t_ns); };
-  return (imu_hole_ && since(imu_hole_->from_ns) > 0.0) ||
+  return (imu_gap_ && since(imu_gap_->from_ns) > 0.0) ||
          (doubtful_since_ns_ && since(*doubtful_since_ns_) < kImageSoon) ||
          (bridged_ns_ && since(*bridged_ns_) < kSettles);
 }
@@ -109,7 +109,7 @@ bool Filter::waits_for_bridge() const {
 /// already, where the state was then.
 void Filter::advance_measuring(TimeNs t_ns) {
   while (!turns_.empty() || !ranges_.empty()) {
-    const auto middle = [](const WheelTurn& turn) { return turn.from_ns + (turn.to_ns - turn.from_ns) / 2; };
+    const auto middle = [](const WheelIncrement& turn) { return turn.from_ns + (turn.to_ns - turn.from_ns) / 2; };
     const bool wheels_next = !turns_.empty() && (ranges_.empty() || middle(turns_.front()) < ranges_.front().t_ns);
     const TimeNs next_ns = wheels_next ? middle(turns_.front()) : ranges_.front().t_ns;
     if (next_ns > t_ns) break;

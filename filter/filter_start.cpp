@@ -67,7 +67,7 @@ void Filter::stop() {
   displacement_.reset();
   displacement_turns_.clear();
   bias_watch_.clear();
-  imu_hole_.reset();
+  imu_gap_.reset();
   doubtful_since_ns_.reset();
   bridged_ns_.reset();
   agrees_since_ns_.fill(0);
@@ -217,7 +217,7 @@ Eigen::VectorXd Filter::start_sigma() const {
   if (encoder_) {
     sigma.segment<2>(err::normal).setConstant(config_.odometer.normal_prior);
     if (online.wheels) sigma.segment<2>(err::wheel_radius).setConstant(prior.wheel_radius);
-    if (online.wheels) sigma(err::wheel_separation) = prior.wheel_separation;
+    if (online.wheels) sigma(err::track_width) = prior.track_width;
     if (online.odometer_rotation) {
       sigma.segment<3>(err::odometer).setConstant(sees_ground() ? prior.odometer_rotation : prior.odometer_unseen);
     }

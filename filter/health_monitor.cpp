@@ -314,18 +314,18 @@ void HealthMonitor::decide(TimeNs t_ns) {
   if (!off || wheels) fitting_ns_ = t_ns;
   contradicted_ = last_.running && seconds_between(fitting_ns_, t_ns) > kContradicted;
 
-  health_.untrusted.reset();
+  health_.faulty.reset();
   for (std::size_t source = 0; source < kSourceCount; ++source) {
     if (trust_[source].trusted()) continue;
-    health_.untrusted.set(source);
+    health_.faulty.set(source);
     health_.onset_ns[source] = trust_[source].onset_ns();
   }
   const bool usable = last_.running && last_.possible && seconds_between(aided_ns_, t_ns) < kUnaided &&
                       velocity_known() && !contradicted_;
-  const HealthStatus status = !started_                 ? HealthStatus::initialising
-                              : !usable                 ? HealthStatus::lost
-                              : health_.untrusted.any() ? HealthStatus::degraded
-                                                        : HealthStatus::tracking;
+  const HealthStatus status = !started_              ? HealthStatus::initialising
+                              : !usable              ? HealthStatus::lost
+                              : health_.faulty.any() ? HealthStatus::degraded
+                                                     : HealthStatus::tracking;
   if (status != health_.status) health_.since_ns = t_ns;
   if (health_.status == HealthStatus::lost && status != HealthStatus::lost) ++health_.reset_counter;
   health_.status = status;

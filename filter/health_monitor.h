@@ -7,8 +7,8 @@
 #include <optional>
 
 #include "ear/calibration.h"
+#include "ear/estimate.h"
 #include "ear/health.h"
-#include "ear/odometry.h"
 #include "filter/frame_check.h"
 #include "filter/input_guard.h"
 

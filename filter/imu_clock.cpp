@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "filter/clock_leap.h"
+#include "filter/clock_jump.h"
 #include "filter/stamp_guard.h"
 
 namespace ear {
@@ -12,9 +12,9 @@ namespace {
 constexpr std::size_t kCapacity = 512;
 constexpr std::size_t kMostWaiting = 256;  // samples: 0.25 s at 1 kHz
 constexpr double kLongestWait = 0.25;      // [s]
-constexpr double kShare = 0.5;             // of the leap: readings that are off by less did not leap
+constexpr double kShare = 0.5;             // of the jump: readings that are off by less did not jump
 constexpr int kVotes = 2;                  // readings, for a verdict
-constexpr std::size_t kFewest = 3;         // samples after the leap: one false stamp is none
+constexpr std::size_t kFewest = 3;         // samples after the jump: one false stamp is none
 constexpr double kReview = 1.0;            // [s] in which a verdict may be undone,
 constexpr int kContradictions = 8;         // by so many readings in a row
 constexpr double kMemory = 100.0;          // samples, readings
@@ -23,9 +23,9 @@ constexpr double kMemory = 100.0;          // samples, readings
 
 ImuClock::ImuClock() : samples_(kCapacity) {}
 
-bool ImuClock::leaps(double step) const { return interval_ > 0.0 && is_clock_leap(step - interval_); }
+bool ImuClock::jumps(double step) const { return interval_ > 0.0 && is_clock_jump(step - interval_); }
 
-/// Can the other sensors tell whose leap it is? Not if they measured meanwhile what the samples leave out.
+/// Can the other sensors tell whose jump it is? Not if they measured meanwhile what the samples leave out.
 bool ImuClock::others_tell(double step) const {
   bool any = false;
   for (const Other& other : others_) {
@@ -39,8 +39,8 @@ bool ImuClock::others_tell(double step) const {
 void ImuClock::follow(TimeNs driver_ns) {
   if (last_ns_) {
     const double step = seconds_between(*last_ns_, driver_ns);
-    if (interval_ == 0.0 && step > 0.0) interval_ = std::min(step, kClockLeap);
-    if (!leaps(step)) interval_ += (step - interval_) / kMemory;
+    if (interval_ == 0.0 && step > 0.0) interval_ = std::min(step, kClockJump);
+    if (!jumps(step)) interval_ += (step - interval_) / kMemory;
   }
   last_ns_ = driver_ns;
   for (Other& other : others_) other.before_ns = other.newest_ns;
@@ -55,15 +55,15 @@ void ImuClock::add(const ImuSample& sample) {
   }
   if (waiting_) {
     const double step = seconds_between(samples_.back().t_ns, sample.t_ns);
-    const bool follows = step > 0.0 && !leaps(step);
+    const bool follows = step > 0.0 && !jumps(step);
     const bool long_enough =
         samples_.size() >= kMostWaiting || static_cast<double>(samples_.size()) * interval_ > kLongestWait;
     if (!follows || long_enough) settle(false);
   } else if (last_ns_) {
     const double step = seconds_between(*last_ns_, sample.t_ns);
-    if (leaps(step) && others_tell(step)) {
+    if (jumps(step) && others_tell(step)) {
       waiting_ = true;
-      leap_ = step - interval_;
+      jump_ = step - interval_;
       votes_ = 0;
     }
   }
@@ -77,7 +77,7 @@ void ImuClock::hear(Stream stream, TimeNs stamp_ns) {
   if (waiting_ && other.before_ns) {
     const double passed = static_cast<double>(samples_.size()) * interval_;
     const double measured = seconds_between(*other.before_ns, stamp_ns);
-    votes_ += std::abs(measured - passed) < kShare * std::abs(leap_) ? 1 : -1;
+    votes_ += std::abs(measured - passed) < kShare * std::abs(jump_) ? 1 : -1;
     const bool enough = samples_.size() >= kFewest || votes_ < 0;
     if (std::abs(votes_) >= kVotes && enough) settle(votes_ > 0);
   }
@@ -88,7 +88,7 @@ void ImuClock::hear(Stream stream, TimeNs stamp_ns) {
 void ImuClock::settle(bool own_clock) {
   waiting_ = false;
   if (own_clock) {
-    shift_ns_ += std::llround(1e9 * leap_);
+    shift_ns_ += std::llround(1e9 * jump_);
     mended_ns_ = samples_.back().t_ns;
     contradictions_ = 0;
     ++mended_;
@@ -96,7 +96,7 @@ void ImuClock::settle(bool own_clock) {
   follow(samples_.back().t_ns);
 }
 
-/// Do the others' stamps keep their usual distance? Where, after a verdict, they turn out to have leapt as well, it is
+/// Do the others' stamps keep their usual distance? Where, after a verdict, they turn out to have jumped as well, it is
 /// undone.
 void ImuClock::review(Other& other, TimeNs stamp_ns) {
   const double ahead = seconds_between(*last_ns_ - shift_ns_, stamp_ns);
@@ -104,10 +104,10 @@ void ImuClock::review(Other& other, TimeNs stamp_ns) {
     other.ahead += (other.newest_ns ? 1.0 / kMemory : 1.0) * (ahead - other.ahead);
     return;
   }
-  const double leapt = (ahead - other.ahead) / leap_;
-  contradictions_ = leapt > kShare && leapt < 1.0 + kShare ? contradictions_ + 1 : 0;
+  const double jumped = (ahead - other.ahead) / jump_;
+  contradictions_ = jumped > kShare && jumped < 1.0 + kShare ? contradictions_ + 1 : 0;
   if (contradictions_ < kContradictions) return;
-  shift_ns_ -= std::llround(1e9 * leap_);
+  shift_ns_ -= std::llround(1e9 * jump_);
   mended_ns_.reset();
   --mended_;
 }

@@ -1,6 +1,6 @@
-// Whose clock is it that jumps? Where the stamps of the inertial samples leap and those of the other sensors, as they
+// Whose clock is it that jumps? Where the stamps of the inertial samples jump and those of the other sensors, as they
 // come in, do not, it is the inertial clock's fault: its stamps are moved back onto the common clock. Where the others
-// leap as well, or went on meanwhile, samples are missing, or time is another for all. docs/filter.md, section 14.
+// jump as well, or went on meanwhile, samples are missing, or time is another for all. docs/filter.md, section 14.
 #pragma once
 
 #include <array>
@@ -18,7 +18,7 @@ class ImuClock {
 
   ImuClock();
 
-  /// A sample as its driver stamped it, in the order of arrival. After a leap samples wait until the other sensors have
+  /// A sample as its driver stamped it, in the order of arrival. After a jump samples wait until the other sensors have
   /// told whose it is, for a quarter of a second at most.
   void add(const ImuSample& sample);
   /// Another sensor's reading came in.
@@ -28,7 +28,7 @@ class ImuClock {
   [[nodiscard]] std::optional<ImuSample> next();
 
   [[nodiscard]] bool waiting() const { return waiting_; }
-  [[nodiscard]] int leaps_mended() const { return mended_; }
+  [[nodiscard]] int jumps_corrected() const { return mended_; }
 
  private:
   /// What is known of another stream; stamps [ns], by its own clock.
@@ -38,7 +38,7 @@ class ImuClock {
     double ahead = 0.0;               ///< [s] of the inertial samples, usually
   };
 
-  [[nodiscard]] bool leaps(double step) const;
+  [[nodiscard]] bool jumps(double step) const;
   [[nodiscard]] bool others_tell(double step) const;
   void follow(TimeNs driver_ns);
   void settle(bool own_clock);
@@ -47,12 +47,12 @@ class ImuClock {
   std::array<Other, 3> others_;
   Ring<ImuSample> samples_;          ///< not fetched yet, by the driver's clock
   bool waiting_ = false;             ///< for a verdict
-  double leap_ = 0.0;                ///< [s] what it is about
-  int votes_ = 0;                    ///< readings for a leap of the inertial clock, less those against
+  double jump_ = 0.0;                ///< [s] what it is about
+  int votes_ = 0;                    ///< readings for a jump of the inertial clock, less those against
   TimeNs shift_ns_ = 0;              ///< driver's clock less the common one
   std::optional<TimeNs> last_ns_;    ///< the newest sample that followed the one before, by the driver's clock
   double interval_ = 0.0;            ///< [s] usual
-  std::optional<TimeNs> mended_ns_;  ///< when a leap was last taken out; until that is past doubt
+  std::optional<TimeNs> mended_ns_;  ///< when a jump was last taken out; until that is past doubt
   int contradictions_ = 0;           ///< readings in a row against it
   int mended_ = 0;
 };

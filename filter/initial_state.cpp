@@ -45,7 +45,7 @@ const Calibration& checked(const Calibration& calibration) {
   if (const auto& encoder = calibration.encoder) {
     require(encoder->wheel_radius[0] > 0.0 && encoder->wheel_radius[1] > 0.0,
             "calibration: wheel_radius must be positive");
-    require(encoder->wheel_separation > 0.0, "calibration: wheel_separation must be positive");
+    require(encoder->track_width > 0.0, "calibration: track_width must be positive");
     require(encoder->resolution > 0, "calibration: encoder resolution must be positive");
     const Eigen::Matrix3d R = encoder->T_BO.linear();
     require((R * R.transpose() - Eigen::Matrix3d::Identity()).norm() < 1e-3 && R.determinant() > 0.0,
@@ -80,7 +80,7 @@ OdometerState odometer_state(const Calibration& calibration) {
   OdometerState odometer;
   if (const auto& encoder = calibration.encoder) {
     odometer.wheel_radius << encoder->wheel_radius[0], encoder->wheel_radius[1];
-    odometer.wheel_separation = encoder->wheel_separation;
+    odometer.track_width = encoder->track_width;
     odometer.T_BO = {renormalized(encoder->T_BO.linear()), encoder->T_BO.translation()};
   }
   if (const auto& lasers = calibration.lasers) {

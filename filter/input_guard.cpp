@@ -15,7 +15,7 @@ constexpr double kStampJitter = 0.01;     // [s] by which a reading may have wai
 constexpr double kLargestRange = 1000.0;  // [m] of a laser: more is a wrong unit
 constexpr double kWidestView = 100.0;     // tan of the angle off the axis: nothing is seen at 89.4 deg
 constexpr std::int64_t kLargestCount = std::int64_t{1} << 60;
-constexpr double kStreamGap = 0.25;  // [s] without readings of a sensor other than the IMU: a hole
+constexpr double kStreamGap = 0.25;  // [s] without readings of a sensor other than the IMU: a gap
 constexpr double kFarAhead = 0.5;    // [s] ahead of the inertial samples: a false stamp
 constexpr double kTooLate = 0.1;     // [s] behind the state: a reading that comes so late is not used
 constexpr double kLostAfter = 2.0;   // [s] without inertial samples: where the vehicle is now nobody knows
@@ -94,8 +94,8 @@ Verdict InputGuard::judge(const EncoderSample& sample, std::optional<TimeNs> sta
   if (!takes_stamp(sample.t_ns, state_ns, last_encoder_ns_, counts)) return Verdict::mistimed;
   if (reader.any()) {
     const double dt = seconds_between(reader.last_ns(), sample.t_ns);
-    const bool hole = dt <= 0.0 || dt > kStreamGap;  // not later than a reading whose stamp was false
-    if (hole) {
+    const bool gap = dt <= 0.0 || dt > kStreamGap;  // not later than a reading whose stamp was false
+    if (gap) {
       reader.clear();
     } else if (reader.largest_angle(sample) > kLargestTurn * (dt + kStampJitter)) {  // or the counter was set anew
       reader.clear();

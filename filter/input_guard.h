@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "ear/calibration.h"
-#include "ear/odometry.h"
+#include "ear/estimate.h"
 #include "ear/types.h"
 #include "filter/stamp_guard.h"
 #include "filter/wheels.h"
@@ -16,7 +16,7 @@ namespace ear {
 
 struct ImuVerdict {
   bool accepted = false;
-  bool begins_anew = false;  ///< after a hole of 2 s, or with another clock: where the vehicle is now nobody knows
+  bool begins_anew = false;  ///< after a gap of 2 s, or with another clock: where the vehicle is now nobody knows
   double unseen = 0.0;       ///< [s] since the sample before, if some are missing between: lost, or refused
   TimeNs clock_shift = 0;    ///< what the stamps before are to be moved by, if the clock was set back [ns]
 };
@@ -29,7 +29,7 @@ enum class Verdict : std::uint8_t {
 
 class InputGuard {
  public:
-  /// `max_imu_gap`: longer holes are counted [s].
+  /// `max_imu_gap`: longer gaps are counted [s].
   InputGuard(const Calibration& calibration, double max_imu_gap);
 
   [[nodiscard]] ImuVerdict judge(const ImuSample& sample);
@@ -42,7 +42,7 @@ class InputGuard {
   /// The frame without the features that cannot be; the frame itself if there are none. Valid until the next call.
   [[nodiscard]] const FeatureFrame& sound(const FeatureFrame& frame);
 
-  /// A reading whose stamp leapt, before it is known why.
+  /// A reading whose stamp jumped, before it is known why.
   Verdict refuse_encoder();
   /// Are the inertial samples refused, for stamps that are not later?
   [[nodiscard]] bool refuses_imu() const { return refused_from_ns_.has_value(); }

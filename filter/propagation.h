@@ -4,7 +4,7 @@
 #include <Eigen/Core>
 
 #include "ear/calibration.h"
-#include "ear/odometry.h"
+#include "ear/estimate.h"
 #include "filter/imu_buffer.h"
 #include "filter/state.h"
 

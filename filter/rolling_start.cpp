@@ -36,8 +36,9 @@ struct Sums {
 
 }  // namespace
 
-std::optional<ImuState> rolling_start(const ImuBuffer& imu, const Ring<WheelTurn>& turns, const OdometerState& odometer,
-                                      const RollingStartNoise& noise, double min_duration) {
+std::optional<ImuState> rolling_start(const ImuBuffer& imu, const Ring<WheelIncrement>& turns,
+                                      const OdometerState& odometer, const RollingStartNoise& noise,
+                                      double min_duration) {
   if (turns.empty()) return std::nullopt;
   const TimeNs start_ns = turns.front().from_ns;
   if (imu.empty() || imu[0].t_ns > start_ns) return std::nullopt;
@@ -50,7 +51,7 @@ std::optional<ImuState> rolling_start(const ImuBuffer& imu, const Ring<WheelTurn
   Sums sums;
   TimeNs now_ns = start_ns;
   for (std::size_t k = 0; k < turns.size(); ++k) {
-    const WheelTurn& turn = turns[k];
+    const WheelIncrement& turn = turns[k];
     if (turn.duration() > kLongestTurn || (k > 0 && turn.from_ns != turns[k - 1].to_ns)) return std::nullopt;
     const TimeNs middle_ns = turn.from_ns + (turn.to_ns - turn.from_ns) / 2;
     Eigen::Vector3d rate = Eigen::Vector3d::Zero();

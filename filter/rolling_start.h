@@ -20,9 +20,9 @@ struct RollingStartNoise {
 /// A state at the start of the first of `turns`. Least squares over the velocity v and gravity g of that moment, in the
 /// body as it then was (B), and the biases:
 ///   R_Bk u_k = v + g t_k + integral of R f,      u_k: the body's velocity that the wheels tell, along the odometer's x
-/// It is a point to linearize at, not an estimate: the samples may be used again. Nothing if the turns have holes, span
+/// It is a point to linearize at, not an estimate: the samples may be used again. Nothing if the turns have gaps, span
 /// less than `min_duration` [s], or contradict the inertial samples, as they do in the air or on slipping wheels.
-[[nodiscard]] std::optional<ImuState> rolling_start(const ImuBuffer& imu, const Ring<WheelTurn>& turns,
+[[nodiscard]] std::optional<ImuState> rolling_start(const ImuBuffer& imu, const Ring<WheelIncrement>& turns,
                                                     const OdometerState& odometer, const RollingStartNoise& noise,
                                                     double min_duration);
 

@@ -13,7 +13,7 @@ constexpr double kNoRest = 0.05;               // [s] wheels that turned so late
 constexpr double kWheelPlay = 0.005;           // [rad] that a wheel at rest may turn: 0.4 mm of its rim
 }  // namespace
 
-void WheelRest::add(const WheelTurn& turn) {
+void WheelRest::add(const WheelIncrement& turn) {
   moved_ += turn.angle;
   if (!any_ || turn.from_ns != newest_ns_ || moved_.cwiseAbs().maxCoeff() > kWheelPlay) {
     since_ns_ = turn.to_ns;

@@ -16,7 +16,7 @@ namespace ear {
 /// Since when have the wheels not turned relative to the body?
 class WheelRest {
  public:
-  void add(const WheelTurn& turn);
+  void add(const WheelIncrement& turn);
   /// Do they rest now, and since when? Nothing if the newest reading is older than `max_age` seconds before t_ns.
   [[nodiscard]] std::optional<double> duration(TimeNs t_ns, double max_age) const;
   void clear() { any_ = false; }

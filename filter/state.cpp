@@ -67,7 +67,7 @@ void boxplus_in_place(State& x, const Eigen::Ref<const Eigen::VectorXd>& d) {
     d_B = exp_so3(tilt_axis(d_B, x.odometer.T_BO.R.col(2)) * d(err::beams + i)) * d_B;
   }
   x.odometer.wheel_radius.array() *= 1.0 + d.segment<2>(err::wheel_radius).array();
-  x.odometer.wheel_separation *= 1.0 + d(err::wheel_separation);
+  x.odometer.track_width *= 1.0 + d(err::track_width);
   x.odometer.T_BO.R = renormalized(x.odometer.T_BO.R * exp_so3(d.segment<3>(err::odometer)));
   apply_local(x.camera.T_BC0, d.segment<3>(err::camera), d.segment<3>(err::camera + 3));
   apply_local(x.camera.T_C0C1, d.segment<3>(err::stereo), d.segment<3>(err::stereo + 3));
@@ -96,7 +96,7 @@ Eigen::VectorXd boxminus(const State& truth, const State& estimate) {
   d.segment<2>(err::normal) = tangent_basis(n).transpose() * rotation_between(n, E.transpose() * truth.ground.n_W);
   d.segment<2>(err::wheel_radius) =
       truth.odometer.wheel_radius.cwiseQuotient(estimate.odometer.wheel_radius).array() - 1.0;
-  d(err::wheel_separation) = truth.odometer.wheel_separation / estimate.odometer.wheel_separation - 1.0;
+  d(err::track_width) = truth.odometer.track_width / estimate.odometer.track_width - 1.0;
   d.segment<3>(err::odometer) = log_so3(estimate.odometer.T_BO.R.transpose() * truth.odometer.T_BO.R);
   for (int i = 0; i < kMaxBeams; ++i) {
     const auto k = static_cast<std::size_t>(i);

@@ -33,14 +33,14 @@ struct BeamRanges {
 namespace err {
 inline constexpr int theta = 0, nu = 3, rho = 6, b_g = 9, b_a = 12;
 inline constexpr int imu_size = 15;
-inline constexpr int normal = imu_size;              ///< delta, tilt of the ground's normal [rad]: 2
-inline constexpr int wheel_radius = normal + 2;      ///< left, right, relative: 2
-inline constexpr int wheel_separation = normal + 4;  ///< relative: 1
-inline constexpr int odometer = normal + 5;          ///< phi, turn of O about its own axes [rad]: 3
-inline constexpr int beams = odometer + 3;           ///< tilt of each laser beam [rad]
-inline constexpr int camera = beams + kMaxBeams;     ///< phi, p of camera 0 in the body: 6
-inline constexpr int stereo = camera + 6;            ///< phi, p of camera 1 in camera 0: 6
-inline constexpr int time_offset = stereo + 6;       ///< [s]
+inline constexpr int normal = imu_size;           ///< delta, tilt of the ground's normal [rad]: 2
+inline constexpr int wheel_radius = normal + 2;   ///< left, right, relative: 2
+inline constexpr int track_width = normal + 4;    ///< relative: 1
+inline constexpr int odometer = normal + 5;       ///< phi, turn of O about its own axes [rad]: 3
+inline constexpr int beams = odometer + 3;        ///< tilt of each laser beam [rad]
+inline constexpr int camera = beams + kMaxBeams;  ///< phi, p of camera 0 in the body: 6
+inline constexpr int stereo = camera + 6;         ///< phi, p of camera 1 in camera 0: 6
+inline constexpr int time_offset = stereo + 6;    ///< [s]
 inline constexpr int calibration_size = 13;
 inline constexpr int clones = camera + calibration_size;
 inline constexpr int clone_size = 6;  ///< theta, rho
@@ -70,7 +70,7 @@ struct GroundState {
 /// Wheels and lasers as the filter knows them.
 struct OdometerState {
   Eigen::Vector2d wheel_radius = Eigen::Vector2d::Ones();  ///< left, right [m]
-  double wheel_separation = 1.0;                           ///< [m]
+  double track_width = 1.0;                                ///< [m]
   Pose T_BO;                                               ///< middle of the axle to body
   std::array<Eigen::Vector3d, kMaxBeams> d_B;              ///< directions of the laser beams
 

@@ -1,6 +1,6 @@
-// The clock of a sensor beside the inertial one. Where its stamps leap, and its readings do not come in otherwise than
-// before, the leap is taken out. Readings that come late keep their steps, those that are missing leave their time out
-// in both: neither is a leap. docs/filter.md, section 14.
+// The clock of a sensor beside the inertial one. Where its stamps jump, and its readings do not come in otherwise than
+// before, the jump is taken out. Readings that come late keep their steps, those that are missing leave their time out
+// in both: neither is a jump. docs/filter.md, section 14.
 #pragma once
 
 #include <optional>
@@ -12,23 +12,23 @@ namespace ear {
 class StreamClock {
  public:
   /// The stamp of a reading by the common clock, `now_ns` being the newest inertial sample, if that tells the time.
-  /// Nothing for the first one after a leap, which may have a false stamp of its own.
+  /// Nothing for the first one after a jump, which may have a false stamp of its own.
   [[nodiscard]] std::optional<TimeNs> correct(TimeNs stamp_ns, std::optional<TimeNs> now_ns);
 
-  [[nodiscard]] int leaps() const { return leaps_; }
+  [[nodiscard]] int jumps() const { return jumps_; }
 
  private:
-  [[nodiscard]] double leap_at(TimeNs t_ns, TimeNs now_ns) const;
+  [[nodiscard]] double jump_at(TimeNs t_ns, TimeNs now_ns) const;
   void follow(TimeNs t_ns, std::optional<TimeNs> now_ns);
 
   TimeNs shift_ns_ = 0;            ///< the sensor's clock less the common one
   std::optional<TimeNs> last_ns_;  ///< of the stamps that followed, corrected
   std::optional<TimeNs> last_now_ns_;
-  std::optional<TimeNs> suspect_ns_;  ///< the one before, if it may have leapt
+  std::optional<TimeNs> suspect_ns_;  ///< the one before, if it may have jumped
   double interval_ = 0.0;             ///< [s] usual
   double ahead_ = 0.0;                ///< [s] of the inertial samples, usually
   int count_ = 0;                     ///< of those
-  int leaps_ = 0;
+  int jumps_ = 0;
 };
 
 }  // namespace ear

@@ -95,7 +95,7 @@ void WheelPreintegration::add_interval(const Eigen::Vector3d& gyro_B, double dt,
   }
   // (5), and the roll of the axle on uneven ground.
   const Eigen::Vector2d rolled = wheels_.radius * (rate.dot(wheels_.y_B) * dt) + wheels_.radius.cwiseProduct(turn);
-  const Eigen::Vector3d lever_rate_Bi = 0.5 * wheels_.separation * dt * (R_half * rate);
+  const Eigen::Vector3d lever_rate_Bi = 0.5 * wheels_.track_width * dt * (R_half * rate);
   const double climb = lever_rate_Bi.dot(heading.f);
   const Advance advance = advance_of_middle(rolled, climb);
 
@@ -105,7 +105,7 @@ void WheelPreintegration::add_interval(const Eigen::Vector3d& gyro_B, double dt,
   const Eigen::Vector2d J_distance_turn = wheels_.radius.cwiseProduct(advance.J_rolled);
   const Eigen::RowVector3d J_distance_rate =
       dt * (J_distance_turn.sum() * wheels_.y_B.transpose() +
-            0.5 * wheels_.separation * advance.J_climb * heading.f.transpose() * R_half);
+            0.5 * wheels_.track_width * advance.J_climb * heading.f.transpose() * R_half);
 
   // (10), (11): how errors of rotation and normal (F), and of the parameters (G), go over into alpha.
   const Eigen::Matrix3d J_alpha_xi =
@@ -118,7 +118,7 @@ void WheelPreintegration::add_interval(const Eigen::Vector3d& gyro_B, double dt,
   G.block<3, 3>(kAlpha, kBias) = J_alpha_xi * J_half_bias - heading.f * J_distance_rate;
   G.block<3, 3>(kXi, kBias) = -R_BiBk_ * gamma<1>(2.0 * half_turn) * dt;
   G.block<3, 2>(kAlpha, kRadius) = heading.f * rolled.cwiseProduct(advance.J_rolled).transpose();
-  G.block<3, 1>(kAlpha, kSeparation) = heading.f * advance.J_climb * climb;
+  G.block<3, 1>(kAlpha, kTrackWidth) = heading.f * advance.J_climb * climb;
   G.block<3, 3>(kAlpha, kAxle) =
       J_alpha_f * heading.J_axle * R_half + dt * J_distance_turn.sum() * heading.f * rate.transpose();
   J_ = (F.lazyProduct(J_) + G).eval();
@@ -165,7 +165,7 @@ WheelDisplacement WheelPreintegration::result() const {
   z.J_alpha_bias = J_.block<3, 3>(kAlpha, kBias);
   z.J_alpha_normal = J_.block<3, 3>(kAlpha, kStartNormal);
   z.J_alpha_radius = J_.block<3, 2>(kAlpha, kRadius);
-  z.J_alpha_separation = J_.block<3, 1>(kAlpha, kSeparation);
+  z.J_alpha_track_width = J_.block<3, 1>(kAlpha, kTrackWidth);
   z.J_alpha_axle = J_.block<3, 3>(kAlpha, kAxle);
   z.J_xi_bias = J_.block<3, 3>(kXi, kBias);
   return z;

@@ -15,7 +15,7 @@ namespace ear {
 /// Two wheels on one axle, as (9) sees them.
 struct WheelModel {
   Eigen::Vector2d radius = Eigen::Vector2d::Ones();  ///< left, right [m]
-  double separation = 0.0;                           ///< [m]
+  double track_width = 0.0;                          ///< [m]
   Eigen::Vector3d y_B = Eigen::Vector3d::UnitY();    ///< direction of the axle, to the left; unit
 };
 
@@ -44,9 +44,9 @@ struct WheelDisplacement {
   Eigen::Matrix3d J_alpha_bias = Eigen::Matrix3d::Zero();                            ///< by b_g [m/(rad/s)]
   Eigen::Matrix3d J_alpha_normal = Eigen::Matrix3d::Zero();                          ///< by n_Bi [m]
   Eigen::Matrix<double, 3, 2> J_alpha_radius = Eigen::Matrix<double, 3, 2>::Zero();  ///< by relative radii [m]
-  Eigen::Vector3d J_alpha_separation = Eigen::Vector3d::Zero();                      ///< by the relative separation [m]
-  Eigen::Matrix3d J_alpha_axle = Eigen::Matrix3d::Zero();                            ///< by y_B [m]
-  Eigen::Matrix3d J_xi_bias = Eigen::Matrix3d::Zero();  ///< of R_BiBj = Exp(xi) R^ by b_g [rad/(rad/s)]
+  Eigen::Vector3d J_alpha_track_width = Eigen::Vector3d::Zero();  ///< by the relative track width [m]
+  Eigen::Matrix3d J_alpha_axle = Eigen::Matrix3d::Zero();         ///< by y_B [m]
+  Eigen::Matrix3d J_xi_bias = Eigen::Matrix3d::Zero();            ///< of R_BiBj = Exp(xi) R^ by b_g [rad/(rad/s)]
 };
 
 class WheelPreintegration {
@@ -72,8 +72,8 @@ class WheelPreintegration {
  private:
   // Error of (alpha, xi, n): R = Exp(xi) R^, the others additive; all in B_i.
   static constexpr int kAlpha = 0, kXi = 3, kNormal = 6, kErrors = 9;
-  // Parameters: n_Bi at the start, b_g, relative radii and separation, y_B.
-  static constexpr int kStartNormal = 0, kBias = 3, kRadius = 6, kSeparation = 8, kAxle = 9, kParameters = 12;
+  // Parameters: n_Bi at the start, b_g, relative radii and track width, y_B.
+  static constexpr int kStartNormal = 0, kBias = 3, kRadius = 6, kTrackWidth = 8, kAxle = 9, kParameters = 12;
 
   WheelModel wheels_;
   WheelNoise noise_;

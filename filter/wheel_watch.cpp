@@ -16,7 +16,7 @@ std::optional<WheelWatch::Motion> WheelWatch::add(const EncoderSample& sample) {
   if (reader_.any() && sample.t_ns <= reader_.last_ns()) return std::nullopt;
   const double body_angle = body_angle_;
   body_angle_ = 0.0;
-  const std::optional<WheelTurn> turn = reader_.add(sample);
+  const std::optional<WheelIncrement> turn = reader_.add(sample);
   if (!turn) return std::nullopt;
 
   Motion motion;

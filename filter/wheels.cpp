@@ -16,13 +16,13 @@ double EncoderReader::angle(std::int64_t from, std::int64_t to) const {
   return 2.0 * M_PI * static_cast<double>(d) / static_cast<double>(calibration_.resolution);
 }
 
-std::optional<WheelTurn> EncoderReader::add(const EncoderSample& sample) {
+std::optional<WheelIncrement> EncoderReader::add(const EncoderSample& sample) {
   const EncoderSample before = last_;
   const bool first = !any_;
   last_ = sample;
   any_ = true;
   if (first) return std::nullopt;
-  WheelTurn turn;
+  WheelIncrement turn;
   turn.from_ns = before.t_ns;
   turn.to_ns = sample.t_ns;
   turn.angle = {angle(before.left_count, sample.left_count), angle(before.right_count, sample.right_count)};
@@ -32,7 +32,7 @@ std::optional<WheelTurn> EncoderReader::add(const EncoderSample& sample) {
 void WheelRows::take_one_wheel(double lever) {
   residual(speed) += lever * residual(yaw_rate);
   H.row(speed) += lever * H.row(yaw_rate);
-  H(speed, ground_column(err::wheel_separation)) -= lever * residual(yaw_rate);  // the lever grows with it
+  H(speed, ground_column(err::track_width)) -= lever * residual(yaw_rate);  // the lever grows with it
   J_gyro.row(speed) += lever * J_gyro.row(yaw_rate);
 }
 
@@ -42,7 +42,7 @@ double EncoderReader::largest_angle(const EncoderSample& sample) const {
 }
 
 WheelRows linearize_wheels(const State& x, const Eigen::Matrix3d& R_WB, const Eigen::Vector3d& v_W,
-                           const WheelTurn& turn, const Eigen::Vector3d& gyro_B, OdometerModel model,
+                           const WheelIncrement& turn, const Eigen::Vector3d& gyro_B, OdometerModel model,
                            bool normal_known) {
   using Eigen::Vector3d;
   const OdometerState& odometer = x.odometer;
@@ -60,12 +60,12 @@ WheelRows linearize_wheels(const State& x, const Eigen::Matrix3d& R_WB, const Ei
 
   WheelRows rows;
   rows.wheel_speed = wheel.mean() + (terrain ? r * y.dot(rate) : 0.0);
-  const double turning = (wheel(1) - wheel(0)) / odometer.wheel_separation;
+  const double turning = (wheel(1) - wheel(0)) / odometer.track_width;
   rows.residual << rows.wheel_speed - f.dot(v_O), -y.dot(v_O), -n.dot(v_O), turning - n.dot(rate);
 
   // Derivatives of y, n, f by the state's errors.
   constexpr int nu = ground_column(err::nu), b_g = ground_column(err::b_g), normal = ground_column(err::normal);
-  constexpr int radius = ground_column(err::wheel_radius), separation = ground_column(err::wheel_separation);
+  constexpr int radius = ground_column(err::wheel_radius), track_width = ground_column(err::track_width);
   constexpr int phi = ground_column(err::odometer);
   const Eigen::Matrix3d y_phi = -R_BO * skew(Vector3d::UnitY());
   Eigen::Matrix3d n_phi = Eigen::Matrix3d::Zero();
@@ -102,9 +102,8 @@ WheelRows linearize_wheels(const State& x, const Eigen::Matrix3d& R_WB, const Ei
     H.block<1, 2>(WheelRows::speed, radius) -= 0.5 * y.dot(rate) * odometer.wheel_radius.transpose();
     H.block<1, 3>(WheelRows::speed, phi) -= r * rate.transpose() * y_phi;
   }
-  H.block<1, 2>(WheelRows::yaw_rate, radius) << wheel(0) / odometer.wheel_separation,
-      -wheel(1) / odometer.wheel_separation;
-  H(WheelRows::yaw_rate, separation) = turning;
+  H.block<1, 2>(WheelRows::yaw_rate, radius) << wheel(0) / odometer.track_width, -wheel(1) / odometer.track_width;
+  H(WheelRows::yaw_rate, track_width) = turning;
   return rows;
 }
 

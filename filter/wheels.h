@@ -13,7 +13,7 @@
 namespace ear {
 
 /// How far the wheels turned relative to the body between two readings.
-struct WheelTurn {
+struct WheelIncrement {
   TimeNs from_ns = 0;
   TimeNs to_ns = 0;
   Eigen::Vector2d angle = Eigen::Vector2d::Zero();  ///< left, right, growing as the wheels roll forward [rad]
@@ -28,7 +28,7 @@ class EncoderReader {
 
   /// The turn since the reading before; nothing for the first. A difference is taken the short way round: wheels must
   /// not turn by more than half a revolution between readings.
-  [[nodiscard]] std::optional<WheelTurn> add(const EncoderSample& sample);
+  [[nodiscard]] std::optional<WheelIncrement> add(const EncoderSample& sample);
 
   /// How far the faster wheel turned since the reading before, which must be there [rad].
   [[nodiscard]] double largest_angle(const EncoderSample& sample) const;
@@ -64,7 +64,7 @@ struct WheelRows {
   double wheel_speed = 0.0;               ///< forward speed that the wheels tell [m/s]
 
   /// In place of the mean of both wheels, one of them and the gyroscope's yaw rate tell the speed. `lever`: where it
-  /// stands on the axle, half the separation; negative for the left one [m].
+  /// stands on the axle, half the track width; negative for the left one [m].
   void take_one_wheel(double lever);
 };
 
@@ -72,7 +72,7 @@ struct WheelRows {
 /// the turn, bias included. With OdometerModel::terrain: (5) with the body's pitch rate, direction along the ground
 /// (6)-(8); otherwise along the body, without it. `normal_known`: false without lasers: the ground is O's own xy-plane.
 [[nodiscard]] WheelRows linearize_wheels(const State& x, const Eigen::Matrix3d& R_WB, const Eigen::Vector3d& v_W,
-                                         const WheelTurn& turn, const Eigen::Vector3d& gyro_B, OdometerModel model,
+                                         const WheelIncrement& turn, const Eigen::Vector3d& gyro_B, OdometerModel model,
                                          bool normal_known);
 
 }  // namespace ear

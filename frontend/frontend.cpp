@@ -9,13 +9,13 @@
 #include <utility>
 
 #include "frontend/detector.h"
-#include "frontend/facet.h"
 #include "frontend/flow_check.h"
 #include "frontend/image_pyramid.h"
 #include "frontend/image_quality.h"
 #include "frontend/lens.h"
 #include "frontend/reference_patch.h"
 #include "frontend/stereo_matcher.h"
+#include "frontend/surface_patch.h"
 
 namespace ear {
 namespace {
@@ -37,7 +37,7 @@ struct Track {
   Warp left;              // of the reference patch
   Eigen::Vector2d left_ray = Eigen::Vector2d::Zero();
   bool has_depth = false;  // known from this or an earlier frame
-  Facet facet;             // in the left camera of this frame; at infinity without depth
+  SurfacePatch surface;    // in the left camera of this frame; at infinity without depth
   bool has_right = false;  // seen by the right camera in this frame
   Eigen::Vector2d right_ray = Eigen::Vector2d::Zero();
 };
@@ -245,7 +245,7 @@ MotionGuess Frontend::Impl::track_probes(const MotionGuess& guess, std::vector<s
 }
 
 bool Frontend::Impl::track_one(Track& track, const Transfer& motion, int level) const {
-  const auto start = carry_over(track.left, track.left_ray, track.facet, motion, lens_, lens_);
+  const auto start = carry_over(track.left, track.left_ray, track.surface, motion, lens_, lens_);
   if (!start) return false;
   const auto match = patches_[track.patch].align(left_, *start, level);
   if (!match) return false;
@@ -257,7 +257,7 @@ bool Frontend::Impl::track_one(Track& track, const Transfer& motion, int level) 
   if (!in(found.x(), image.width) || !in(found.y(), image.height)) return false;
   const auto ray = lens_.to_normalized(found.cast<double>());
   if (!ray) return false;
-  track.facet = track.facet.seen_after(motion, track.left_ray, *ray);
+  track.surface = track.surface.seen_after(motion, track.left_ray, *ray);
   track.left = match->warp;
   track.left_ray = *ray;
   track.has_right = false;
@@ -268,7 +268,7 @@ bool Frontend::Impl::track_one(Track& track, const Transfer& motion, int level) 
 Flow Frontend::Impl::flow(std::size_t track) const {
   const Track& before = previous_[track];
   const double sigma = stereo_ ? kDisparitySigmaPx * stereo_->inverse_depth_per_pixel() : 0.0;
-  return {before.left_ray, tracks_[track].left_ray, before.facet.inverse_depth(before.left_ray), sigma,
+  return {before.left_ray, tracks_[track].left_ray, before.surface.inverse_depth(before.left_ray), sigma,
           before.has_depth};
 }
 
@@ -288,7 +288,7 @@ void Frontend::Impl::match_stereo(Track& track, bool had_right) {
   const ReferencePatch& patch = patches_[track.patch];
   std::optional<StereoMatch> match;
   if (track.has_depth) {
-    match = stereo_->follow(right_, patch, track.left, track.left_ray, track.facet);
+    match = stereo_->follow(right_, patch, track.left, track.left_ray, track.surface);
   }
   // The search is expensive, and mostly fails where it has failed before: try again at ages 0, 1, 2, 4, 8, ...
   const bool due = (track.age & (track.age - 1)) == 0;
@@ -296,7 +296,7 @@ void Frontend::Impl::match_stereo(Track& track, bool had_right) {
   track.has_right = match.has_value();
   if (!match) return;
   track.has_depth = true;
-  track.facet = match->facet;
+  track.surface = match->surface;
   track.right_ray = match->right;
 }
 

@@ -41,11 +41,11 @@ std::optional<Eigen::Vector2d> StereoMatcher::project(const Eigen::Vector2d& lef
   return right_lens_.to_pixel(point.hnormalized());
 }
 
-// `start` is what `facet` made expect. Where the patch came out more sheared than that along the epipolar line, the
-// facet leans more.
+// `start` is what `surface` made expect. Where the patch came out more sheared than that along the epipolar line, the
+// surface patch leans more.
 std::optional<StereoMatch> StereoMatcher::accept(const ReferencePatch::Match& match, const Warp& start,
                                                  const Warp& left_warp, const Eigen::Vector2d& left,
-                                                 const Facet& facet) const {
+                                                 const SurfacePatch& surface) const {
   const auto right = right_lens_.to_normalized(match.warp.centre.cast<double>());
   if (!right) return std::nullopt;
   const auto point = intersect(right_from_left_, left, *right);
@@ -57,29 +57,29 @@ std::optional<StereoMatch> StereoMatcher::accept(const ReferencePatch::Match& ma
   const Eigen::Vector2d slope = right_from_left_.p_10.head<2>() - *right * right_from_left_.p_10.z();
   const double focal_ratio = left_lens_.focal_px() / right_lens_.focal_px();
   const Eigen::Vector2d gradient =
-      facet.gradient() + focal_ratio * unexpected.transpose() * slope / slope.squaredNorm();
-  return StereoMatch{*right, Facet::through(left, std::max(point->inverse_depth, 0.0), gradient)};
+      surface.gradient() + focal_ratio * unexpected.transpose() * slope / slope.squaredNorm();
+  return StereoMatch{*right, SurfacePatch::through(left, std::max(point->inverse_depth, 0.0), gradient)};
 }
 
 std::optional<StereoMatch> StereoMatcher::follow(const ImagePyramid& right, const ReferencePatch& patch,
                                                  const Warp& left_warp, const Eigen::Vector2d& left,
-                                                 const Facet& facet) const {
-  const auto start = carry_over(left_warp, left, facet, right_from_left_, left_lens_, right_lens_);
+                                                 const SurfacePatch& surface) const {
+  const auto start = carry_over(left_warp, left, surface, right_from_left_, left_lens_, right_lens_);
   if (!start) return std::nullopt;
   const auto match = patch.align(right, *start, 0);
   if (!match) return std::nullopt;
-  const auto accepted = accept(*match, *start, left_warp, left, facet);
+  const auto accepted = accept(*match, *start, left_warp, left, surface);
   if (!accepted) return std::nullopt;
-  const double inverse_depth = facet.inverse_depth(left);
-  const double jump = std::abs(accepted->facet.inverse_depth(left) - inverse_depth);
+  const double inverse_depth = surface.inverse_depth(left);
+  const double jump = std::abs(accepted->surface.inverse_depth(left) - inverse_depth);
   if (jump > kMaxDepthJumpPx * inverse_depth_per_pixel_ + kMaxDepthJumpShare * inverse_depth) return std::nullopt;
   return accepted;
 }
 
 std::optional<StereoMatch> StereoMatcher::search(const ImagePyramid& right, const ReferencePatch& patch,
                                                  const Warp& left_warp, const Eigen::Vector2d& left) const {
-  // How a facet that faces the camera looks hardly depends on its depth; take it halfway.
-  const Facet facing = Facet::through(left, 0.25 * max_inverse_depth_);
+  // How a surface patch that faces the camera looks hardly depends on its depth; take it halfway.
+  const SurfacePatch facing = SurfacePatch::through(left, 0.25 * max_inverse_depth_);
   const auto carried = carry_over(left_warp, left, facing, right_from_left_, left_lens_, right_lens_);
   if (!carried) return std::nullopt;
   const auto at = [&](const Eigen::Vector2d& pixel) {

@@ -5,18 +5,18 @@
 #include <optional>
 
 #include "ear/calibration.h"
-#include "frontend/facet.h"
 #include "frontend/image_pyramid.h"
 #include "frontend/lens.h"
 #include "frontend/reference_patch.h"
 #include "frontend/stereo_geometry.h"
+#include "frontend/surface_patch.h"
 
 namespace ear {
 
 /// A feature seen by both cameras.
 struct StereoMatch {
   Eigen::Vector2d right = Eigen::Vector2d::Zero();  ///< normalized coordinates
-  Facet facet;                                      ///< in the left camera; its inverse depth is not negative
+  SurfacePatch surface;                             ///< in the left camera; its inverse depth is not negative
 };
 
 class StereoMatcher {
@@ -24,11 +24,11 @@ class StereoMatcher {
   /// `nearest_depth` [m]: closer points are not searched for.
   StereoMatcher(const CameraCalibration& left, const CameraCalibration& right, double nearest_depth);
 
-  /// Follows a match known from before: starts where `facet` says. Nothing if the patch is not there, off the epipolar
-  /// line, or at a very different depth.
+  /// Follows a match known from before: starts where `surface` says. Nothing if the patch is not there, off the
+  /// epipolar line, or at a very different depth.
   [[nodiscard]] std::optional<StereoMatch> follow(const ImagePyramid& right, const ReferencePatch& patch,
                                                   const Warp& left_warp, const Eigen::Vector2d& left,
-                                                  const Facet& facet) const;
+                                                  const SurfacePatch& surface) const;
 
   /// Searches the whole epipolar line. Nothing if the patch is not found, or at two places alike.
   [[nodiscard]] std::optional<StereoMatch> search(const ImagePyramid& right, const ReferencePatch& patch,
@@ -47,7 +47,7 @@ class StereoMatcher {
   [[nodiscard]] std::optional<Eigen::Vector2d> project(const Eigen::Vector2d& left, double inverse_depth) const;
   [[nodiscard]] std::optional<StereoMatch> accept(const ReferencePatch::Match& match, const Warp& start,
                                                   const Warp& left_warp, const Eigen::Vector2d& left,
-                                                  const Facet& facet) const;
+                                                  const SurfacePatch& surface) const;
 
   Lens left_lens_;
   Lens right_lens_;

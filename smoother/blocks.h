@@ -4,7 +4,7 @@
 //                                             the body, camera 1 in camera 0
 //   motion  (9) v_W b_g b_a                   additive
 //   offset  (1) camera stamp to IMU time      additive [s]
-//   wheels  (6) relative error of the radii (left, right) and of the separation, turn of the odometer [rad]; of the
+//   wheels  (6) relative error of the radii (left, right) and of the track width, turn of the odometer [rad]; of the
 //               calibration that was given    additive
 //   point   (3) alpha, beta, inverse depth    additive; in a camera frame that stays where it is in the world
 #pragma once
@@ -31,7 +31,7 @@ namespace motion_entry {
 inline constexpr int v = 0, b_g = 3, b_a = 6;
 }
 namespace wheel_entry {
-inline constexpr int radius = 0, separation = 2, turn = 3;
+inline constexpr int radius = 0, track_width = 2, turn = 3;
 }
 
 [[nodiscard]] inline Pose to_pose(const double* block) {

@@ -50,7 +50,7 @@ bool GroundNormal::add(const std::array<double, kMaxBeams>& range, const Odomete
     ++(take(range[i] - z.range, z.H_normal, sigma) ? used_ : rejected_);
   }
   const AxlePrediction axle = predict_axle(x, I);
-  take(-axle.lean, axle.H_normal, std::sqrt(2.0) * config_.unevenness / odometer.wheel_separation);
+  take(-axle.lean, axle.H_normal, std::sqrt(2.0) * config_.unevenness / odometer.track_width);
 
   const double vague = 1.0 / (config_.normal_prior * config_.normal_prior);
   reading_sigma_ = std::sqrt(0.5 * (A + vague * Eigen::Matrix2d::Identity()).inverse().trace());

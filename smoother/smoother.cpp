@@ -96,7 +96,7 @@ void Smoother::add_encoder(const EncoderSample& sample) {
   if (!window_) starter_->add_encoder(sample);
   if (!encoder_ || guard_.judge(sample, state_time(), *encoder_) != Verdict::accepted) return;
   note_contact(contact_.add_encoder(sample));
-  const std::optional<WheelTurn> turn = encoder_->add(sample);
+  const std::optional<WheelIncrement> turn = encoder_->add(sample);
   if (!turn) return;
   wheel_rest_.add(*turn);
   if (turns_.full()) turns_.pop();

@@ -104,8 +104,8 @@ class Smoother final : public Estimator {
   ImpactGuard impact_guard_;
   ImuBuffer imu_;
   std::optional<EncoderReader> encoder_;
-  Ring<WheelTurn> turns_;  ///< not yet passed by the newest frame
-  std::optional<WheelTurn> passed_turn_;
+  Ring<WheelIncrement> turns_;  ///< not yet passed by the newest frame
+  std::optional<WheelIncrement> passed_turn_;
   Ring<BeamRanges> ranges_;  ///< not yet used
   ContactDetector contact_;
   WheelRest wheel_rest_;

@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kWheelAge = 0.1;              // [s] older readings do not tell whether the wheels rest
 constexpr double kRefused = 1.0;               // [m] standard deviation of a direction that wheels tell nothing of
-constexpr TimeNs kMissedReading = 50'000'000;  // [ns] without wheel readings: an interval has a hole
+constexpr TimeNs kMissedReading = 50'000'000;  // [ns] without wheel readings: an interval has a gap
 constexpr TimeNs kRateOver = 10'000'000;       // [ns] over which the rate at a frame is averaged
 
 }  // namespace
@@ -113,7 +113,7 @@ std::optional<WheelDisplacement> Smoother::integrate_wheels(const ImuState& x, T
   const TurnsBetween turns(passed_turn_, turns_);
   TimeNs now_ns = x.t_ns;
   for (std::size_t i = 0; i < turns.size() && now_ns < t_ns; ++i) {
-    const WheelTurn& turn = turns[i];
+    const WheelIncrement& turn = turns[i];
     const bool last = i + 1 == turns.size();
     if (turn.to_ns <= now_ns && !last) continue;
     if (turn.from_ns > now_ns + kMissedReading || (last && t_ns > turn.to_ns + kMissedReading)) return std::nullopt;

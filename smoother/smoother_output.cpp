@@ -10,7 +10,7 @@ namespace {
 
 constexpr double kLongestPredict = 0.5;  // [s] beyond the newest sample
 constexpr double kLostVelocity = 1.0;    // [m/s] standard deviation: lost
-constexpr double kLeap = 1.0;  // [m] from one frame to the next, beyond twice what the velocity explains: lost
+constexpr double kJump = 1.0;  // [m] from one frame to the next, beyond twice what the velocity explains: lost
 
 Aiding aiding_of(const FrameStatistics& frame) {
   const bool cameras = frame.features_used > 0;
@@ -60,19 +60,19 @@ TerrainEstimate Smoother::terrain() const {
   return {true, ground.along, ground.across, std::sqrt(P_slope(0, 0)), std::sqrt(P_slope(1, 1))};
 }
 
-/// Lost: no numbers, a velocity that nothing knows, or a leap that no velocity explains.
+/// Lost: no numbers, a velocity that nothing knows, or a jump that no velocity explains.
 void Smoother::judge(const Estimate& estimate) {
   const auto variance = estimate.covariance.diagonal();
   const NavState& x = estimate.state;
   const bool finite =
       estimate.covariance.allFinite() && x.p_WB.allFinite() && x.v_W.allFinite() && x.q_WB.coeffs().allFinite();
   const double velocity = std::sqrt(variance.segment<3>(estimate_error::velocity).maxCoeff());
-  double leap = 0.0;
+  double jump = 0.0;
   if (last_good_ && health_.status == HealthStatus::tracking) {
     const double speed = std::max(x.v_W.norm(), last_good_->state.v_W.norm());
-    leap = (x.p_WB - last_good_->state.p_WB).norm() - 2.0 * speed * seconds_between(last_good_->state.t_ns, x.t_ns);
+    jump = (x.p_WB - last_good_->state.p_WB).norm() - 2.0 * speed * seconds_between(last_good_->state.t_ns, x.t_ns);
   }
-  const bool lost = !finite || velocity > kLostVelocity || leap > kLeap;
+  const bool lost = !finite || velocity > kLostVelocity || jump > kJump;
   const HealthStatus status = lost ? HealthStatus::lost : HealthStatus::tracking;
   if (status != health_.status) health_.since_ns = x.t_ns;
   health_.status = status;

@@ -10,7 +10,7 @@ WheelDisplacement chained(const WheelDisplacement& first, const WheelDisplacemen
   const Eigen::Vector3d alpha_Bj =
       second.alpha_Bi + second.J_alpha_bias * bias +
       second.J_alpha_radius * (first.wheels.radius.cwiseQuotient(second.wheels.radius) - Eigen::Vector2d::Ones()) +
-      second.J_alpha_separation * (first.wheels.separation / second.wheels.separation - 1.0) +
+      second.J_alpha_track_width * (first.wheels.track_width / second.wheels.track_width - 1.0) +
       second.J_alpha_axle * (first.wheels.y_B - second.wheels.y_B);
   const Eigen::Matrix3d& R = first.R_BiBj;
   const Eigen::Vector3d alpha_Bi = R * alpha_Bj;
@@ -31,7 +31,7 @@ WheelDisplacement chained(const WheelDisplacement& first, const WheelDisplacemen
   z.J_alpha_normal.setZero();
   z.J_alpha_bias += J_alpha_xi * first.J_xi_bias + R * second.J_alpha_bias;
   z.J_alpha_radius += R * second.J_alpha_radius;
-  z.J_alpha_separation += R * second.J_alpha_separation;
+  z.J_alpha_track_width += R * second.J_alpha_track_width;
   z.J_alpha_axle += R * second.J_alpha_axle;
   z.J_xi_bias += R * second.J_xi_bias;
   return z;

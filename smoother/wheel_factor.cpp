@@ -9,7 +9,7 @@ namespace ear::smoother {
 OdometerState with_errors(const OdometerState& given, const double* wheels) {
   OdometerState odometer = given;
   odometer.wheel_radius.array() *= 1.0 + Eigen::Map<const Eigen::Array2d>(wheels + wheel_entry::radius);
-  odometer.wheel_separation *= 1.0 + wheels[wheel_entry::separation];
+  odometer.track_width *= 1.0 + wheels[wheel_entry::track_width];
   odometer.T_BO.R *= exp_so3(Eigen::Map<const Eigen::Vector3d>(wheels + wheel_entry::turn));
   return odometer;
 }
@@ -32,7 +32,7 @@ bool WheelFactor::Evaluate(double const* const* blocks, double* residual, double
   const Eigen::Vector3d alpha_Bi =
       z.alpha_Bi + z.J_alpha_bias * (b_g - z.b_g) +
       z.J_alpha_radius * (odometer.wheel_radius.cwiseQuotient(z.wheels.radius) - Eigen::Vector2d::Ones()) +
-      z.J_alpha_separation * (odometer.wheel_separation / z.wheels.separation - 1.0) +
+      z.J_alpha_track_width * (odometer.track_width / z.wheels.track_width - 1.0) +
       z.J_alpha_axle * (y_B - z.wheels.y_B);
   const Eigen::Matrix3d R_iW = T_i.R.transpose();
   const Eigen::Vector3d lever_W = T_j.R * p_BO;
@@ -61,8 +61,7 @@ bool WheelFactor::Evaluate(double const* const* blocks, double* residual, double
     Eigen::Matrix<double, 3, 6> J;
     const Eigen::Map<const Eigen::Vector3d> turn(blocks[3] + wheel_entry::turn);
     J.leftCols<2>() = whitening_ * z.J_alpha_radius * given_.wheel_radius.cwiseQuotient(z.wheels.radius).asDiagonal();
-    J.col(wheel_entry::separation) =
-        whitening_ * z.J_alpha_separation * (given_.wheel_separation / z.wheels.separation);
+    J.col(wheel_entry::track_width) = whitening_ * z.J_alpha_track_width * (given_.track_width / z.wheels.track_width);
     J.middleCols<3>(wheel_entry::turn) =
         -whitening_ * z.J_alpha_axle * odometer.T_BO.R * skew(Eigen::Vector3d::UnitY()) * gamma<1>(-turn);
     store(J, jacobians[3]);

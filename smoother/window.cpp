@@ -30,7 +30,7 @@ Eigen::MatrixXd start_covariance(const Eigen::MatrixXd& P) {
   take(err::stereo, 6);
   take(err::time_offset, 1);
   take(err::wheel_radius, 2);
-  take(err::wheel_separation, 1);
+  take(err::track_width, 1);
   take(err::odometer, 3);
   Eigen::MatrixXd P_start = P(entries, entries);
   P_start.diagonal().head<3>().array() += kLeastRotation * kLeastRotation;

@@ -92,7 +92,7 @@ ear::EncoderCalibration encoder_of(const ear_calibration& from) {
   encoder.resolution = from.counts_per_turn;
   encoder.wraps = from.counts_wrap != 0;
   encoder.wheel_radius = {from.wheel_radius[0], from.wheel_radius[1]};
-  encoder.wheel_separation = from.wheel_separation;
+  encoder.track_width = from.track_width;
   encoder.noise_counts = from.encoder_noise_counts;
   return encoder;
 }
@@ -177,7 +177,7 @@ void write_health(const ear::Health& from, ear_health& to) {
   to = {};
   to.status = static_cast<ear_health_status>(from.status);
   to.since_ns = from.since_ns;
-  to.untrusted = static_cast<std::uint32_t>(from.untrusted.to_ulong());
+  to.faulty = static_cast<std::uint32_t>(from.faulty.to_ulong());
   std::copy(from.onset_ns.begin(), from.onset_ns.end(), to.onset_ns);
   to.aiding = static_cast<ear_aiding>(from.aiding);
   to.quality = from.quality;
@@ -233,7 +233,7 @@ void ear_default_calibration(ear_calibration* calibration) {
   calibration->counts_per_turn = encoder.resolution;
   calibration->counts_wrap = encoder.wraps ? 1 : 0;
   std::copy_n(encoder.wheel_radius.begin(), 2, calibration->wheel_radius);
-  calibration->wheel_separation = encoder.wheel_separation;
+  calibration->track_width = encoder.track_width;
   calibration->encoder_noise_counts = encoder.noise_counts;
   for (ear_beam& beam : calibration->beams) Eigen::Vector3d::Map(beam.d_B) = ear::LaserBeam{}.d_B;
   const ear::LaserCalibration lasers;
@@ -394,7 +394,7 @@ ear_result ear_counts_of(const ear_odometry* odometry, ear_counts* counts) {
     counts->laser_rejected = inputs.laser.rejected();
     counts->imu_spikes = inputs.imu_spikes;
     counts->imu_gaps = inputs.imu.gaps;
-    counts->clock_leaps = inputs.clock_leaps;
+    counts->clock_jumps = inputs.clock_jumps;
     counts->frames_rejected = inputs.camera.rejected() - inputs.camera.far_ahead;
     counts->frames_without_imu = inputs.camera.far_ahead;
     return EAR_OK;

@@ -41,7 +41,7 @@ std::string to_text(const Health& health) {
   if (health.status != HealthStatus::degraded) return text;
   const char* separator = ": without ";
   for (std::size_t source = 0; source < kSourceCount; ++source) {
-    if (!health.untrusted[source]) continue;
+    if (!health.faulty[source]) continue;
     text += separator + std::string(kSourceNames[source]);
     separator = ", ";
   }

@@ -10,7 +10,7 @@ void LiveState::add(const ImuSample& sample) {
   if (const Told* const told = told_.take()) begin(*told);
 }
 
-/// Where the stamps leap, the estimator has to tell what that means.
+/// Where the stamps jump, the estimator has to tell what that means.
 void LiveState::take(const ImuSample& sample) {
   if (!samples_.empty()) {
     const double dt = seconds_between(samples_.back().t_ns, sample.t_ns);

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <optional>
 
-#include "ear/odometry.h"
+#include "ear/estimate.h"
 #include "filter/ring.h"
 #include "filter/state.h"
 #include "src/latest_value.h"

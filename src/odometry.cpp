@@ -1,4 +1,4 @@
-// Samples -> sensor buffer -> front end -> filter -> Estimate.
+// Samples -> ingest -> front end -> filter -> Estimate.
 #include "ear/odometry.h"
 
 #include <chrono>
@@ -10,11 +10,12 @@
 #include "filter/stamp_guard.h"
 #include "frontend/frontend.h"
 #include "src/load_governor.h"
+#include "src/odometry_factory.h"
 
 namespace ear {
 namespace {
 
-constexpr double kFrameGap = 0.25;  // [s] between two frames: a hole
+constexpr double kFrameGap = 0.25;  // [s] between two frames: a gap
 
 MotionPrediction to_prediction(const std::optional<RelativeMotion>& motion) {
   MotionPrediction prediction;
@@ -116,7 +117,7 @@ class Odometry::Impl {
     const OdometerState odometer = estimator_->odometer();
     if (learned.encoder) {
       learned.encoder->wheel_radius = {odometer.wheel_radius(0), odometer.wheel_radius(1)};
-      learned.encoder->wheel_separation = odometer.wheel_separation;
+      learned.encoder->track_width = odometer.track_width;
       learned.encoder->T_BO = isometry(odometer.T_BO);
     }
     if (learned.lasers) {
@@ -213,13 +214,11 @@ class Odometry::Impl {
 };
 
 Odometry::Odometry(const Config& config, const Calibration& calibration, Clock clock)
-    : Odometry(
+    : Odometry(OdometryFactory::make(
           config, calibration,
           [](const FilterConfig& filter, const Calibration& given) { return std::make_unique<Filter>(filter, given); },
-          std::move(clock)) {}
-Odometry::Odometry(const Config& config, const Calibration& calibration, MakeEstimator make, Clock clock)
-    : impl_(std::make_unique<Impl>(config, calibration, std::move(make),
-                                   clock ? std::move(clock) : Clock(machine_time))) {}
+          std::move(clock))) {}
+Odometry::Odometry(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Odometry::~Odometry() = default;
 Odometry::Odometry(Odometry&&) noexcept = default;
 Odometry& Odometry::operator=(Odometry&&) noexcept = default;
@@ -236,5 +235,10 @@ InputCounts Odometry::input_counts() const { return impl_->input_counts(); }
 StageTimes Odometry::stage_times() const { return impl_->stage_times(); }
 Calibration Odometry::calibration() const { return impl_->calibration(); }
 void Odometry::reset() { *impl_ = impl_->fresh(); }
+
+Odometry OdometryFactory::make(const Config& config, const Calibration& calibration, MakeEstimator make, Clock clock) {
+  if (!clock) clock = machine_time;
+  return Odometry(std::make_unique<Odometry::Impl>(config, calibration, std::move(make), std::move(clock)));
+}
 
 }  // namespace ear

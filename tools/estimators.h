@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "ear/odometry.h"
+#include "src/odometry_factory.h"
 
 namespace ear::tools {
 

@@ -62,7 +62,7 @@ void FlightController::before_sample(const Sample& sample, const Odometry& odome
 
 void FlightController::after_frame(const ReplayedFrame& frame, const Odometry& odometry) {
   const auto message = stream_.add_frame(frame.estimate, odometry.status());
-  announce(stream_.health(), odometry.health().untrusted);
+  announce(stream_.health(), odometry.health().faulty);
   if (message) link_.send(*message);
 }
 
@@ -78,8 +78,8 @@ std::string FlightController::report() const {
   return line.data();
 }
 
-void FlightController::announce(mavlink::LinkHealth health, const SourceSet& untrusted) {
-  const mavlink::StatusText text = mavlink::to_text(health, untrusted);
+void FlightController::announce(mavlink::LinkHealth health, const SourceSet& faulty) {
+  const mavlink::StatusText text = mavlink::to_text(health, faulty);
   if (text.text == announced_) return;
   announced_ = text.text;
   link_.set_state(mavlink::to_system_state(health));

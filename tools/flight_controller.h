@@ -42,7 +42,7 @@ class FlightController {
   [[nodiscard]] std::string report() const;
 
  private:
-  void announce(mavlink::LinkHealth health, const SourceSet& untrusted);
+  void announce(mavlink::LinkHealth health, const SourceSet& faulty);
 
   RealTimeClock clock_;
   mavlink::OdometryStream stream_;

@@ -147,7 +147,7 @@ RunSummary summarize(const RunArguments& args, const Recording& recording, const
                     {"beams_used", totals.beams_used},
                     {"beams_rejected", totals.beams_rejected},
                     {"imu_spikes", inputs.imu_spikes},
-                    {"clock_leaps", inputs.clock_leaps},
+                    {"clock_jumps", inputs.clock_jumps},
                     {"wild_features", inputs.features_rejected},
                     {"steps_rejected", inputs.steps_rejected},
                     {"resets", odometry.health().reset_counter}};
@@ -167,7 +167,7 @@ RunSummary summarize(const RunArguments& args, const Recording& recording, const
   if (learned.encoder) {
     summary.calibration.emplace_back("wheel_radius_left", learned.encoder->wheel_radius[0]);
     summary.calibration.emplace_back("wheel_radius_right", learned.encoder->wheel_radius[1]);
-    summary.calibration.emplace_back("wheel_separation", learned.encoder->wheel_separation);
+    summary.calibration.emplace_back("track_width", learned.encoder->track_width);
   }
   return summary;
 }
@@ -182,7 +182,7 @@ void run(const RunArguments& args) {
   options.mono = args.mono;
   const OpenedRecording opened(args.recording, args.config);
   Recording recording(opened.folder(), options);
-  Odometry odometry(config, recording.calibration(), estimator_named(args.estimator));
+  Odometry odometry = OdometryFactory::make(config, recording.calibration(), estimator_named(args.estimator));
 
   std::filesystem::create_directories(args.out);
   TumWriter trajectory(args.out / "estimate.tum");

@@ -43,7 +43,7 @@ struct EncoderCalibration {
   std::int64_t resolution = 262144;                  ///< counts per revolution
   bool wraps = true;                                 ///< counts are an angle modulo the resolution, else cumulative
   std::array<double, 2> wheel_radius{0.075, 0.075};  ///< left, right [m]
-  double wheel_separation = 0.40;                    ///< [m]
+  double track_width = 0.40;                         ///< [m]
   double noise_counts = 2.0;                         ///< one reading, 1-sigma [count]
 };
 

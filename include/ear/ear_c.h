@@ -72,7 +72,7 @@ typedef struct {
   int64_t counts_per_turn;
   int32_t counts_wrap;         /* counts are an angle modulo counts_per_turn, else cumulative */
   double wheel_radius[2];      /* left, right [m] */
-  double wheel_separation;     /* [m] */
+  double track_width;          /* [m] */
   double encoder_noise_counts; /* of one reading, 1-sigma [count] */
 
   int32_t beam_count; /* 0: no lasers */
@@ -210,7 +210,7 @@ typedef enum {
   EAR_HEALTH_LOST = 3          /* it may be anywhere, and none is given */
 } ear_health_status;
 
-/* Each is bit 1 << EAR_SOURCE_... of ear_health.untrusted, and has its place in the array. */
+/* Each is bit 1 << EAR_SOURCE_... of ear_health.faulty, and has its place in the array. */
 typedef enum {
   EAR_SOURCE_CAMERA_LEFT = 0,
   EAR_SOURCE_CAMERA_RIGHT = 1,
@@ -236,7 +236,7 @@ typedef enum {
 typedef struct {
   ear_health_status status;
   int64_t since_ns;                   /* when the status began, IMU time */
-  uint32_t untrusted;                 /* sources that the estimate should rest on, and does not */
+  uint32_t faulty;                    /* sources that the estimate should rest on, and does not */
   int64_t onset_ns[EAR_SOURCE_COUNT]; /* of these: since when */
   ear_aiding aiding;                  /* what is left */
   int32_t quality;                    /* 0 (lost) ... 100 */
@@ -256,7 +256,7 @@ const char* ear_source_text(ear_source source);
 typedef struct {
   uint64_t imu_overflow, encoder_overflow, laser_overflow, frame_overflow; /* the queue was full, or too full */
   uint64_t imu_rejected, encoder_rejected, laser_rejected;                 /* not finite, out of order, too late */
-  uint64_t imu_spikes, imu_gaps, clock_leaps;
+  uint64_t imu_spikes, imu_gaps, clock_jumps;
   uint64_t frames_rejected, frames_without_imu;
 } ear_counts;
 

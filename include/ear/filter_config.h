@@ -30,7 +30,7 @@ struct PriorConfig {
   double time_offset = 1e-3;        ///< [s] camera against IMU
   double wheel_radius = 5e-3;       ///< of each wheel, relative
   double wheel_scale = 1e-2;        ///< of both wheels alike, relative, where neither camera nor lasers exist
-  double wheel_separation = 5e-3;   ///< relative
+  double track_width = 5e-3;        ///< relative
   double odometer_rotation = 5e-3;  ///< [rad] odometer in the body
   double odometer_unseen = 5e-2;    ///< [rad] the same without lasers, where it is what was guessed
   double beam_tilt = 5e-3;          ///< [rad] each laser beam
@@ -40,7 +40,7 @@ struct PriorConfig {
 struct OnlineCalibrationConfig {
   bool camera_extrinsics = true;  ///< pose of camera 0 in the body, and of camera 1 in camera 0
   bool time_offset = true;        ///< camera against IMU
-  bool wheels = true;             ///< wheel radii, and their separation where the yaw rate is used
+  bool wheels = true;             ///< wheel radii, and their track width where the yaw rate is used
   bool odometer_rotation = true;  ///< the odometer's mounting in the body
   bool beam_tilt = false;         ///< the directions of the laser beams
 };
@@ -126,7 +126,7 @@ struct FilterConfig {
   double huber_px = 1.5;               ///< observations further off than this weigh less [px]
   double gate_probability = 0.997;     ///< chi-square gate of every feature and row
   double keyframe_parallax_px = 12.0;  ///< a clone with less median parallax to its elder makes room first [px]
-  double max_imu_gap = 0.05;           ///< [s] a longer hole in the IMU data is bridged, counted, and its noise raised
+  double max_imu_gap = 0.05;           ///< [s] a longer gap in the IMU data is bridged, counted, and its noise raised
   PriorConfig prior;
   StandstillConfig standstill;
   OnlineCalibrationConfig online_calibration;

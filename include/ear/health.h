@@ -60,7 +60,7 @@ struct SourceRecord {
 struct Health {
   HealthStatus status = HealthStatus::initialising;
   TimeNs since_ns = 0;                          ///< when the status began (IMU time)
-  SourceSet untrusted;                          ///< sources that the estimate should rest on, and does not
+  SourceSet faulty;                             ///< sources that the estimate should rest on, and does not
   std::array<TimeNs, kSourceCount> onset_ns{};  ///< of these: since when
   Aiding aiding = Aiding::none;                 ///< what is left
   int quality = 0;                              ///< 0 (lost) ... 100

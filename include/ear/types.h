@@ -5,14 +5,26 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 namespace ear {
 
 using TimeNs = std::int64_t;
 
-/// Seconds from `from` to `to`. The only place where a time becomes floating point: as a difference.
-[[nodiscard]] inline double seconds_between(TimeNs from, TimeNs to) { return 1e-9 * static_cast<double>(to - from); }
+/// to - from; the largest or smallest number where the difference is none: stamps come from outside.
+[[nodiscard]] constexpr TimeNs duration_ns(TimeNs from, TimeNs to) {
+  constexpr TimeNs kLargest = std::numeric_limits<TimeNs>::max();
+  constexpr TimeNs kSmallest = std::numeric_limits<TimeNs>::min();
+  if (from < 0 && to > kLargest + from) return kLargest;
+  if (from > 0 && to < kSmallest + from) return kSmallest;
+  return to - from;
+}
+
+/// Seconds from `from` to `to`, of any two stamps. The only place where a time becomes floating point: as a difference.
+[[nodiscard]] inline double seconds_between(TimeNs from, TimeNs to) {
+  return 1e-9 * static_cast<double>(duration_ns(from, to));
+}
 
 /// One inertial sample, in the body frame B (which is the IMU's frame).
 struct ImuSample {
@@ -64,6 +76,7 @@ struct FeatureFrame {
   TimeNs t_ns = 0;
   std::vector<FeatureObservation> features;
   bool right_skipped = false;  ///< nobody looked for them in the right image, though there is a second camera
+  bool repeated = false;       ///< the image is, byte for byte, the one before: a camera that delivers it twice
 };
 
 }  // namespace ear

@@ -5,7 +5,7 @@
 #include <Eigen/Core>
 
 #include "ear/calibration.h"
-#include "ear/odometry.h"
+#include "ear/estimate.h"
 #include "src/mavlink/messages.h"
 
 namespace ear::mavlink {

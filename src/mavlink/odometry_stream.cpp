@@ -32,12 +32,12 @@ constexpr std::array<Part, 5> kParts{{{"cameras", Source::camera_left, Source::c
                                       {"gyro", Source::gyroscope, Source::gyroscope},
                                       {"accel", Source::accelerometer, Source::accelerometer}}};
 
-std::string without(const SourceSet& untrusted) {
+std::string without(const SourceSet& faulty) {
   std::string text = "ear: without";
   const char* separator = " ";
   for (const Part& part : kParts) {
     bool any = false;
-    for (std::size_t i = index_of(part.first); i <= index_of(part.last); ++i) any = any || untrusted[i];
+    for (std::size_t i = index_of(part.first); i <= index_of(part.last); ++i) any = any || faulty[i];
     if (!any) continue;
     text += separator + std::string(part.name);
     separator = ", ";
@@ -47,14 +47,14 @@ std::string without(const SourceSet& untrusted) {
 
 }  // namespace
 
-StatusText to_text(LinkHealth health, const SourceSet& untrusted) {
+StatusText to_text(LinkHealth health, const SourceSet& faulty) {
   switch (health) {
     case LinkHealth::starting:
       return {Severity::notice, "ear: not started"};
     case LinkHealth::good:
       return {Severity::notice, "ear: tracking"};
     case LinkHealth::weak:
-      return {Severity::warning, untrusted.any() ? without(untrusted) : "ear: tracking, but few features in view"};
+      return {Severity::warning, faulty.any() ? without(faulty) : "ear: tracking, but few features in view"};
     case LinkHealth::lost:
       return {Severity::critical, "ear: lost, no odometry"};
   }
@@ -116,7 +116,7 @@ LinkHealth OdometryStream::health_after(const std::optional<Estimate>& estimate,
   if (seconds_between(last_supported_ns_, estimate->state.t_ns) > kMaxUnsupported) return LinkHealth::lost;
   const Health& health = estimate->health;
   const int least = health_ == LinkHealth::weak ? kGoodQuality : kWeakQuality;
-  return health.untrusted.any() || health.quality < least ? LinkHealth::weak : LinkHealth::good;
+  return health.faulty.any() || health.quality < least ? LinkHealth::weak : LinkHealth::good;
 }
 
 OdometryMessage OdometryStream::make_message(const NavState& state) {

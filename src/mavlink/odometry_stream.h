@@ -8,8 +8,8 @@
 #include <optional>
 
 #include "ear/calibration.h"
+#include "ear/estimate.h"
 #include "ear/health.h"
-#include "ear/odometry.h"
 #include "src/mavlink/messages.h"
 #include "src/mavlink/odometry_message.h"
 
@@ -23,8 +23,8 @@ enum class LinkHealth : std::uint8_t {
   lost   ///< there was an estimate, and there is none, or inertia alone carries it on
 };
 
-/// `untrusted`: by whom a weak estimate does without.
-[[nodiscard]] StatusText to_text(LinkHealth health, const SourceSet& untrusted);
+/// `faulty`: by whom a weak estimate does without.
+[[nodiscard]] StatusText to_text(LinkHealth health, const SourceSet& faulty);
 [[nodiscard]] SystemState to_system_state(LinkHealth health);
 
 class OdometryStream {

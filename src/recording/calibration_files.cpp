@@ -88,7 +88,7 @@ EncoderCalibration read_encoder(const fs::path& file) {
   encoder.wraps = map.get<bool>("wraps");
   const std::vector<double> radius = map.numbers("wheel_radius", 2);
   encoder.wheel_radius = {radius[0], radius[1]};
-  encoder.wheel_separation = map.get<double>("wheel_separation");
+  encoder.track_width = map.get<double>("wheel_separation");
   encoder.noise_counts = map.get<double>("noise_counts");
   return encoder;
 }

@@ -105,7 +105,7 @@ void check_encoder(const EncoderCalibration& encoder, Findings& findings) {
   check_pose(encoder.T_BO, "encoder0: T_BS", findings);
   findings.require_positive("encoder0: resolution", static_cast<double>(encoder.resolution));
   for (const double radius : encoder.wheel_radius) findings.require_positive("encoder0: wheel_radius", radius);
-  findings.require_positive("encoder0: wheel_separation", encoder.wheel_separation);
+  findings.require_positive("encoder0: wheel_separation", encoder.track_width);
   findings.require_positive("encoder0: noise_counts", encoder.noise_counts);
 }
 

@@ -72,7 +72,7 @@ EnableFor<C, PriorConfig> visit(C& c, F&& f) {
   f("time_offset", c.time_offset);
   f("wheel_radius", c.wheel_radius);
   f("wheel_scale", c.wheel_scale);
-  f("wheel_separation", c.wheel_separation);
+  f("track_width", c.track_width);
   f("odometer_rotation", c.odometer_rotation);
   f("odometer_unseen", c.odometer_unseen);
   f("beam_tilt", c.beam_tilt);

@@ -13,7 +13,7 @@ struct TimingReport {
   std::size_t count = 0;
   TimeNs first_ns = 0;
   TimeNs last_ns = 0;
-  double rate_hz = 0.0;      ///< of the median interval: holes do not lower it
+  double rate_hz = 0.0;      ///< of the median interval: gaps do not lower it
   double jitter_s = 0.0;     ///< standard deviation of the intervals that are not gaps [s]
   std::size_t gaps = 0;      ///< intervals longer than three median ones
   double longest_gap = 0.0;  ///< the longest interval [s]

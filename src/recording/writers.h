@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "ear/odometry.h"
+#include "ear/estimate.h"
 #include "src/recording/warnings.h"
 
 namespace ear {

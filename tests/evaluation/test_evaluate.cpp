@@ -96,7 +96,7 @@ TEST_CASE("evaluate: a scale error is the same share of every stretch, a turning
     CHECK(relative.translation == doctest::Approx(0.02).epsilon(1e-6));
 }
 
-TEST_CASE("evaluate: stretches longer than the drive, or across a hole, do not count") {
+TEST_CASE("evaluate: stretches longer than the drive, or across a gap, do not count") {
   Trajectory poses = drive(7.0, 10.0);
   const Evaluation result = evaluate(estimate_of(poses), drive(7.0, 50.0), AlignmentKind::none);
   REQUIRE(result.relative.size() == 2);

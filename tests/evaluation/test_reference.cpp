@@ -80,7 +80,7 @@ std::string states_file(const std::vector<Pose>& poses, std::mt19937_64& rng) {
   return text.str();
 }
 
-/// Drifting and noisy, in a world of its own, with a hole from 20 to 21 s, from before the truth until after its end.
+/// Drifting and noisy, in a world of its own, with a gap from 20 to 21 s, from before the truth until after its end.
 Trajectory estimate_poses(std::mt19937_64& rng, double extent) {
   Trajectory poses;
   Eigen::Vector3d drift = Eigen::Vector3d::Zero();

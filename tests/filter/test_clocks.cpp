@@ -1,4 +1,4 @@
-// The clocks of the sensors: a leap of one of them is taken out, all else is left alone.
+// The clocks of the sensors: a jump of one of them is taken out, all else is left alone.
 #include <doctest/doctest.h>
 
 #include <algorithm>
@@ -14,7 +14,7 @@ using namespace ear;
 namespace {
 
 constexpr TimeNs kMs = 1'000'000;
-constexpr TimeNs kLeapAt = 2'000 * kMs;
+constexpr TimeNs kJumpAt = 2'000 * kMs;
 constexpr TimeNs kBackAt = 4'000 * kMs;
 constexpr TimeNs kEnd = 6'000 * kMs;
 
@@ -22,7 +22,7 @@ constexpr TimeNs kEnd = 6'000 * kMs;
 using Driver = std::function<TimeNs(TimeNs)>;
 
 TimeNs sound(TimeNs t) { return t; }
-bool amiss(TimeNs t) { return t >= kLeapAt && t < kBackAt; }
+bool amiss(TimeNs t) { return t >= kJumpAt && t < kBackAt; }
 
 /// A stamp at which an inertial sample comes out, and the true time.
 struct Out {
@@ -69,40 +69,40 @@ double largest_error(const std::vector<Out>& out) {
 
 }  // namespace
 
-TEST_CASE("imu clock: without leaps each sample comes out at once, as it is") {
+TEST_CASE("imu clock: without jumps each sample comes out at once, as it is") {
   CHECK(largest_error(run(sound, sound, sound)) == 0.0);
   CHECK(largest_error(run(
             sound, [](TimeNs) { return TimeNs{-1}; }, sound)) == 0.0);
 }
 
-TEST_CASE("imu clock: a leap of its own is taken out, ahead and back, also with cameras alone") {
+TEST_CASE("imu clock: a jump of its own is taken out, ahead and back, also with cameras alone") {
   for (const bool wheels : {true, false}) {
-    for (const TimeNs leap : {60 * kMs, 100 * kMs, -100 * kMs, 1500 * kMs, -1500 * kMs}) {
-      CAPTURE(leap);
+    for (const TimeNs jump : {60 * kMs, 100 * kMs, -100 * kMs, 1500 * kMs, -1500 * kMs}) {
+      CAPTURE(jump);
       CAPTURE(wheels);
-      const Driver leaping = [leap](TimeNs t) { return amiss(t) ? t + leap : t; };
-      if (!wheels && std::abs(leap) < 100 * kMs) continue;  // within two frames' intervals
-      CHECK(largest_error(run(leaping, sound, sound, wheels)) < 1e-3);
+      const Driver jumping = [jump](TimeNs t) { return amiss(t) ? t + jump : t; };
+      if (!wheels && std::abs(jump) < 100 * kMs) continue;  // within two frames' intervals
+      CHECK(largest_error(run(jumping, sound, sound, wheels)) < 1e-3);
     }
   }
 }
 
-TEST_CASE("imu clock: samples that are missing, and clocks that leap together, are no leap of its own") {
-  const Driver gap = [](TimeNs t) { return t >= kLeapAt && t < kLeapAt + 300 * kMs ? TimeNs{-1} : t; };
+TEST_CASE("imu clock: samples that are missing, and clocks that jump together, are no jump of its own") {
+  const Driver gap = [](TimeNs t) { return t >= kJumpAt && t < kJumpAt + 300 * kMs ? TimeNs{-1} : t; };
   CHECK(largest_error(run(gap, sound, sound)) == 0.0);
   CHECK(largest_error(run(gap, gap, gap)) == 0.0);
-  for (const TimeNs leap : {100 * kMs, -100 * kMs}) {
-    const Driver leaping = [leap](TimeNs t) { return amiss(t) ? t + leap : t; };
-    const std::vector<Out> out = run(leaping, leaping, leaping);
-    for (const Out& o : out) CHECK(o.stamp == leaping(o.t));
+  for (const TimeNs jump : {100 * kMs, -100 * kMs}) {
+    const Driver jumping = [jump](TimeNs t) { return amiss(t) ? t + jump : t; };
+    const std::vector<Out> out = run(jumping, jumping, jumping);
+    for (const Out& o : out) CHECK(o.stamp == jumping(o.t));
   }
 }
 
-TEST_CASE("imu clock: one false stamp is none, nor are the wheels' own leaps") {
-  const Driver once = [](TimeNs t) { return t == kLeapAt ? t - 100 * kMs : t; };
+TEST_CASE("imu clock: one false stamp is none, nor are the wheels' own jumps") {
+  const Driver once = [](TimeNs t) { return t == kJumpAt ? t - 100 * kMs : t; };
   for (const Out& o : run(once, sound, sound)) CHECK(o.stamp == once(o.t));
-  const Driver leaping = [](TimeNs t) { return amiss(t) ? t + 100 * kMs : t; };
-  CHECK(largest_error(run(sound, leaping, sound)) == 0.0);
+  const Driver jumping = [](TimeNs t) { return amiss(t) ? t + 100 * kMs : t; };
+  CHECK(largest_error(run(sound, jumping, sound)) == 0.0);
 }
 
 TEST_CASE("imu clock: a verdict that later readings contradict is undone") {
@@ -119,7 +119,7 @@ TEST_CASE("imu clock: a verdict that later readings contradict is undone") {
     while (const auto s = clock.next()) newest = s->t_ns;
   };
   TimeNs t = 0;
-  for (; t < kLeapAt; t += 5 * kMs) {
+  for (; t < kJumpAt; t += 5 * kMs) {
     add(t);
     if (t % (10 * kMs) == 0) hear(t);
   }
@@ -156,11 +156,11 @@ std::vector<Out> run_stream(const Driver& driver, const std::function<TimeNs(Tim
 
 }  // namespace
 
-TEST_CASE("stream clock: a leap is taken out, but for the first reading after it") {
-  for (const TimeNs leap : {60 * kMs, 100 * kMs, -100 * kMs, 1000 * kMs, -1000 * kMs}) {
-    CAPTURE(leap);
-    const Driver leaping = [leap](TimeNs t) { return amiss(t) ? t + leap : t; };
-    const std::vector<Out> out = run_stream(leaping);
+TEST_CASE("stream clock: a jump is taken out, but for the first reading after it") {
+  for (const TimeNs jump : {60 * kMs, 100 * kMs, -100 * kMs, 1000 * kMs, -1000 * kMs}) {
+    CAPTURE(jump);
+    const Driver jumping = [jump](TimeNs t) { return amiss(t) ? t + jump : t; };
+    const std::vector<Out> out = run_stream(jumping);
     CHECK(largest_error(out) < 1e-3);
     CHECK(out.size() == run_stream(sound).size() - 2);
   }
@@ -170,28 +170,28 @@ TEST_CASE("stream clock: late, missing and repeated readings are left alone") {
   const auto late = [](TimeNs t) { return amiss(t) ? 212 * kMs : 12 * kMs; };
   CHECK(largest_error(run_stream(sound, late)) == 0.0);
   CHECK(run_stream(sound, late).size() == run_stream(sound).size());
-  const Driver gap = [](TimeNs t) { return t >= kLeapAt && t < kLeapAt + 300 * kMs ? TimeNs{-1} : t; };
+  const Driver gap = [](TimeNs t) { return t >= kJumpAt && t < kJumpAt + 300 * kMs ? TimeNs{-1} : t; };
   CHECK(largest_error(run_stream(gap)) == 0.0);
   const Driver every_other = [](TimeNs t) { return amiss(t) && t % (66 * kMs) != 0 ? TimeNs{-1} : t; };
   CHECK(largest_error(run_stream(every_other)) == 0.0);
   CHECK(largest_error(run_stream(every_other, late)) == 0.0);
 }
 
-TEST_CASE("stream clock: one false stamp is left out, and clocks that leap together are left alone") {
+TEST_CASE("stream clock: one false stamp is left out, and clocks that jump together are left alone") {
   const Driver once = [](TimeNs t) { return t == 2013 * kMs ? t + 200 * kMs : t; };
   const std::vector<Out> out = run_stream(once);
   CHECK(largest_error(out) == 0.0);
   CHECK(out.size() == run_stream(sound).size() - 1);
 
-  const Driver leaping = [](TimeNs t) { return amiss(t) ? t + 100 * kMs : t; };
+  const Driver jumping = [](TimeNs t) { return amiss(t) ? t + 100 * kMs : t; };
   const auto with_all = [](TimeNs t) { return (amiss(t) ? 100 * kMs : 0) + 12 * kMs; };
-  for (const Out& o : run_stream(leaping, with_all)) CHECK(o.stamp == leaping(o.t));
+  for (const Out& o : run_stream(jumping, with_all)) CHECK(o.stamp == jumping(o.t));
 }
 
 TEST_CASE("stream clock: while nobody knows the time it changes nothing") {
-  const Driver leaping = [](TimeNs t) { return amiss(t) ? t + 100 * kMs : t; };
-  const auto unknown = [](TimeNs t) { return t < kLeapAt - 100 * kMs || t > kLeapAt + 100 * kMs; };
-  for (const Out& o : run_stream(leaping, {}, unknown)) {
-    if (o.t < kBackAt) CHECK(o.stamp == leaping(o.t));
+  const Driver jumping = [](TimeNs t) { return amiss(t) ? t + 100 * kMs : t; };
+  const auto unknown = [](TimeNs t) { return t < kJumpAt - 100 * kMs || t > kJumpAt + 100 * kMs; };
+  for (const Out& o : run_stream(jumping, {}, unknown)) {
+    if (o.t < kBackAt) CHECK(o.stamp == jumping(o.t));
   }
 }

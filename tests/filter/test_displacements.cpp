@@ -40,8 +40,8 @@ State random_start(std::mt19937_64& rng) {
   return x;
 }
 
-Ring<WheelTurn> random_turns(std::mt19937_64& rng) {
-  Ring<WheelTurn> turns(64);
+Ring<WheelIncrement> random_turns(std::mt19937_64& rng) {
+  Ring<WheelIncrement> turns(64);
   for (TimeNs t_ns = kStart - 3'000'000; t_ns < kEnd - 4'000'000; t_ns += 10'000'000) {
     const Eigen::Vector3d rate = Eigen::Vector3d::Constant(12.0) + random_vector(rng, 1.0);
     turns.push({t_ns, t_ns + 10'000'000, 0.01 * rate.head<2>()});
@@ -152,13 +152,13 @@ TEST_CASE("displacements: the covariance of the wheels' follows from the state's
   std::mt19937_64 rng{75};
   const State x = random_start(rng);
   const ImuBuffer samples = random_samples(rng, x);
-  const Ring<WheelTurn> turns = random_turns(rng);
+  const Ring<WheelIncrement> turns = random_turns(rng);
   Eigen::VectorXd sigma = Eigen::VectorXd::Zero(err::clones);
   sigma.segment<3>(err::theta).setConstant(0.05);
   sigma.segment<3>(err::b_g).setConstant(0.02);
   sigma.segment<2>(err::normal).setConstant(0.01);
   sigma.segment<2>(err::wheel_radius).setConstant(0.01);
-  sigma(err::wheel_separation) = 0.01;
+  sigma(err::track_width) = 0.01;
   sigma.segment<3>(err::odometer).setConstant(0.01);
   Covariance P(err::clones);
   P.reset(sigma);
@@ -187,11 +187,11 @@ TEST_CASE("displacements: the wheels' is that of the body, and needs readings al
   // On the spot, turning left at 1 rad/s: the axle's middle stands, the body goes round it.
   ImuBuffer samples(64);
   for (TimeNs t_ns = kStart; t_ns <= kEnd; t_ns += 5'000'000) samples.push({t_ns, {0, 0, 1.0}, {0, 0, 9.81}});
-  Ring<WheelTurn> turns(64);
+  Ring<WheelIncrement> turns(64);
   for (TimeNs t_ns = kStart + 6'000'000; t_ns < kEnd; t_ns += 10'000'000) {
     turns.push({t_ns, t_ns + 10'000'000, {-0.02, 0.02}});
   }
-  const std::optional<WheelTurn> passed = WheelTurn{kStart - 4'000'000, kStart + 6'000'000, {-0.02, 0.02}};
+  const std::optional<WheelIncrement> passed = WheelIncrement{kStart - 4'000'000, kStart + 6'000'000, {-0.02, 0.02}};
   const auto displacement = [&](TimeNs until_ns) {
     return wheel_displacement(x, P, TurnsBetween(passed, turns), samples, until_ns, setting_of(x));
   };

@@ -87,7 +87,7 @@ TEST_CASE("health: a sound vehicle is tracked") {
   drive.frame.horizontal_sigma = 0.1;
   drive.go_on(2.0);
   CHECK(drive.health().status == HealthStatus::tracking);
-  CHECK(drive.health().untrusted.none());
+  CHECK(drive.health().faulty.none());
   CHECK(drive.health().aiding == Aiding::cameras_and_wheels);
   CHECK(drive.health().quality == 100);
   CHECK(drive.health().horizontal_sigma == 0.1);
@@ -104,8 +104,8 @@ TEST_CASE("health: one source that is rejected degrades within half a second, an
     drive.reject(source);
     drive.go_on(0.45);
     CHECK(drive.health().status == HealthStatus::degraded);
-    CHECK(drive.health().untrusted.count() == 1);
-    CHECK(drive.health().untrusted[i]);
+    CHECK(drive.health().faulty.count() == 1);
+    CHECK(drive.health().faulty[i]);
     CHECK(drive.health().quality <= 60);
     CHECK(drive.health().onset_ns[i] >= at(0.95));
     drive.records = sound;
@@ -154,14 +154,14 @@ TEST_CASE("health: images that stop are noticed without a frame") {
   drive.go_on(1.0);
   drive.imu_until(1.5);
   CHECK(drive.health().status == HealthStatus::degraded);
-  CHECK(drive.health().untrusted[index_of(Source::camera_left)]);
+  CHECK(drive.health().faulty[index_of(Source::camera_left)]);
   drive.imu_until(4.0);
   CHECK(drive.health().status == HealthStatus::lost);
 }
 
 TEST_CASE("health: a frozen image, a stuck beam, a gap, a clipped value, a jumping clock") {
   const auto degraded_by = [](Drive& drive, Source source) {
-    return drive.health().status == HealthStatus::degraded && drive.health().untrusted[index_of(source)];
+    return drive.health().status == HealthStatus::degraded && drive.health().faulty[index_of(source)];
   };
   SUBCASE("frozen") {
     Drive drive;
@@ -178,7 +178,7 @@ TEST_CASE("health: a frozen image, a stuck beam, a gap, a clipped value, a jumpi
                               LaserCalibration{}, at(1.0 + 0.02 * i));
     drive.go_on(0.05);
     CHECK(degraded_by(drive, Source::beam_0));
-    CHECK(drive.health().untrusted.count() == 1);
+    CHECK(drive.health().faulty.count() == 1);
   }
   SUBCASE("gap") {
     Drive drive;
@@ -196,7 +196,7 @@ TEST_CASE("health: a frozen image, a stuck beam, a gap, a clipped value, a jumpi
     }
     drive.go_on(0.05);
     CHECK(degraded_by(drive, Source::accelerometer));
-    CHECK_FALSE(drive.health().untrusted[index_of(Source::gyroscope)]);
+    CHECK_FALSE(drive.health().faulty[index_of(Source::gyroscope)]);
   }
   SUBCASE("clock") {
     Drive drive;
@@ -251,8 +251,8 @@ TEST_CASE("health: images in doubt are named, and in flight carry the estimate a
   SUBCASE("they come late, and fit") { drive.stamp_error = -200'000'000; }
   drive.go_on(0.45);
   CHECK(drive.health().status == HealthStatus::degraded);
-  CHECK(drive.health().untrusted[index_of(Source::camera_left)]);
-  CHECK(drive.health().untrusted[index_of(Source::camera_right)]);
+  CHECK(drive.health().faulty[index_of(Source::camera_left)]);
+  CHECK(drive.health().faulty[index_of(Source::camera_right)]);
   drive.go_on(4.0);
   CHECK(drive.health().status == HealthStatus::degraded);
   CHECK(drive.health().aiding == Aiding::cameras);
@@ -272,7 +272,7 @@ TEST_CASE("health: cameras that turn otherwise accuse the gyroscope, but not by 
     drive.go_on(5.0);
     drive.frame.agreement.turn = Eigen::Vector3d(0.0, 0.0, 0.03 * 0.05);  // 0.03 rad/s
     drive.go_on(1.0);
-    CHECK(drive.health().untrusted[index_of(Source::gyroscope)] == (feigned == 0.0));
+    CHECK(drive.health().faulty[index_of(Source::gyroscope)] == (feigned == 0.0));
   }
 }
 

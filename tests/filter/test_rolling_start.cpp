@@ -13,7 +13,7 @@ namespace {
 /// Two seconds of a simulated drive, from `from` seconds on.
 struct Window {
   ImuBuffer imu{4096};
-  Ring<WheelTurn> turns{512};
+  Ring<WheelIncrement> turns{512};
   OdometerState odometer;
   TimeNs start_ns = 0;
 
@@ -66,23 +66,23 @@ TEST_CASE("rolling start: tilt, speed and direction of a vehicle that drives") {
   }
 }
 
-TEST_CASE("rolling start: not in the air, not with holes, not from too little") {
+TEST_CASE("rolling start: not in the air, not with gaps, not from too little") {
   const simulator::Simulation simulation = drive("flat1", 822);
   const Window window(simulation, 8.0);
   const RollingStartNoise noise;
   CHECK_FALSE(rolling_start(window.imu, window.turns, window.odometer, noise, 2.5));
   CHECK_FALSE(rolling_start(ImuBuffer(8), window.turns, window.odometer, noise, 1.5));
-  CHECK_FALSE(rolling_start(window.imu, Ring<WheelTurn>(8), window.odometer, noise, 1.5));
+  CHECK_FALSE(rolling_start(window.imu, Ring<WheelIncrement>(8), window.odometer, noise, 1.5));
 
-  Ring<WheelTurn> with_hole(512);
+  Ring<WheelIncrement> with_gap(512);
   for (std::size_t i = 0; i < window.turns.size(); ++i) {
-    if (i != 50) with_hole.push(window.turns[i]);
+    if (i != 50) with_gap.push(window.turns[i]);
   }
-  CHECK_FALSE(rolling_start(window.imu, with_hole, window.odometer, noise, 1.5));
+  CHECK_FALSE(rolling_start(window.imu, with_gap, window.odometer, noise, 1.5));
 
-  Ring<WheelTurn> contradicting(512);  // wheels that race, at accelerations that the accelerometer does not see
+  Ring<WheelIncrement> contradicting(512);  // wheels that race, at accelerations that the accelerometer does not see
   for (std::size_t i = 0; i < window.turns.size(); ++i) {
-    WheelTurn turn = window.turns[i];
+    WheelIncrement turn = window.turns[i];
     turn.angle *= 1.0 + 2.0 * std::sin(0.3 * static_cast<double>(i));
     contradicting.push(turn);
   }

@@ -72,7 +72,7 @@ Outcome drive(const Car& car, std::uint64_t seed, const FilterConfig& config = {
   EncoderCalibration& axle = calibration.encoder.emplace();
   axle.wraps = false;
   axle.wheel_radius = {kRadius, kRadius};
-  axle.wheel_separation = 1.57;
+  axle.track_width = 1.57;
   axle.noise_counts = 20.0;
   Filter filter(config, calibration);
 

@@ -38,7 +38,7 @@ WheelDisplacement drive(const WheelModel& wheels, const Eigen::Vector3d& n_Bi, c
 WheelModel random_wheels(std::mt19937_64& rng) {
   WheelModel wheels;
   wheels.radius = {0.074, 0.077};
-  wheels.separation = 0.4;
+  wheels.track_width = 0.4;
   wheels.y_B = (Eigen::Vector3d::UnitY() + random_vector(rng, 0.1)).normalized();
   return wheels;
 }
@@ -91,7 +91,7 @@ TEST_CASE("wheel_preintegration: wheels that climb unlike each other roll furthe
   // The left wheel rises by 5 degrees, the right one sinks by as much: the axle rolls to the right as it goes level.
   const double climb = 5.0 * M_PI / 180.0;
   WheelModel wheels = wheels_along_y();
-  wheels.separation = 0.4;
+  wheels.track_width = 0.4;
   const double roll_rate = 0.75 * std::sin(climb) / 0.2;
   const WheelDisplacement z = drive(wheels, kUp, {roll_rate, 0.0, 0.0}, {10.0, 10.0}, 0.01);
   CHECK(z.alpha_Bi.x() == doctest::Approx(0.0075 * std::cos(climb)).epsilon(1e-5));
@@ -148,10 +148,10 @@ TEST_CASE("wheel_preintegration: the derivatives, by bias, normal, radii and axl
     check_jacobian(
         [&](const Eigen::VectorXd& d) -> Eigen::VectorXd {
           WheelModel other = wheels;
-          other.separation *= 1.0 + d(0);
+          other.track_width *= 1.0 + d(0);
           return preintegrate(intervals, other, WheelNoise{}, n_Bi, b_g).alpha_Bi;
         },
-        z.J_alpha_separation);
+        z.J_alpha_track_width);
     check_jacobian(
         [&](const Eigen::VectorXd& d) -> Eigen::VectorXd {
           WheelModel other = wheels;
@@ -204,7 +204,7 @@ void move(Truth& truth, const WheelInterval& interval, const WheelModel& wheels,
     const double about_axle = interval.gyro_B.dot(wheels.y_B) * dt;
     const double left = wheels.radius(0) * (interval.turn(0) / kPieces + about_axle);
     const double right = wheels.radius(1) * (interval.turn(1) / kPieces + about_axle);
-    const double climb = 0.5 * wheels.separation * dt * ahead.dot(truth.R * interval.gyro_B);
+    const double climb = 0.5 * wheels.track_width * dt * ahead.dot(truth.R * interval.gyro_B);
     truth.p += 0.5 * (std::sqrt(left * left - climb * climb) + std::sqrt(right * right - climb * climb)) * ahead;
     path += 0.5 * (std::abs(left) + std::abs(right));
     truth.R = truth.R * Eigen::AngleAxisd(dt * interval.gyro_B.norm(), interval.gyro_B.normalized());

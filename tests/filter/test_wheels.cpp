@@ -13,26 +13,26 @@ using namespace ear::test;
 namespace {
 
 constexpr double kRadius = 0.075;
-constexpr double kSeparation = 0.4;
+constexpr double kTrackWidth = 0.4;
 
 /// Standing at the origin, IMU above the axle.
 State simple_state() {
   State x;
   x.odometer.wheel_radius.setConstant(kRadius);
-  x.odometer.wheel_separation = kSeparation;
+  x.odometer.track_width = kTrackWidth;
   x.odometer.T_BO.p = {0.0, 0.0, -0.05};
   return x;
 }
 
 /// 10 ms in which the rims roll at these speeds over a body that does not pitch.
-WheelTurn rims(double left, double right) {
-  WheelTurn turn;
+WheelIncrement rims(double left, double right) {
+  WheelIncrement turn;
   turn.to_ns = 10'000'000;
   turn.angle = Eigen::Vector2d(left, right) * 0.01 / kRadius;
   return turn;
 }
 
-WheelRows rows_of(const State& x, const WheelTurn& turn, const Eigen::Vector3d& gyro_B,
+WheelRows rows_of(const State& x, const WheelIncrement& turn, const Eigen::Vector3d& gyro_B,
                   OdometerModel model = OdometerModel::terrain, bool normal_known = true) {
   return linearize_wheels(x, x.imu.R_WB, x.imu.v_W, turn, gyro_B, model, normal_known);
 }
@@ -52,7 +52,7 @@ TEST_CASE("wheels: a left turn has the right wheel ahead") {
   State x = simple_state();
   x.imu.v_W = {0.5, 0.0, 0.0};
   const double rate = 0.8;
-  const WheelTurn turn = rims(0.5 - 0.5 * kSeparation * rate, 0.5 + 0.5 * kSeparation * rate);
+  const WheelIncrement turn = rims(0.5 - 0.5 * kTrackWidth * rate, 0.5 + 0.5 * kTrackWidth * rate);
   CHECK(rows_of(x, turn, {0.0, 0.0, rate}).residual.norm() < 1e-12);
 }
 
@@ -60,7 +60,7 @@ TEST_CASE("wheels: a nose-down swing on standing wheels turns the encoders back,
   State x = simple_state();
   const double rate = 0.7;              // nose-down is positive about y, to the left
   x.imu.v_W = {rate * 0.05, 0.0, 0.0};  // the IMU is above the axle and goes forward
-  const WheelTurn turn = rims(-rate * kRadius, -rate * kRadius);
+  const WheelIncrement turn = rims(-rate * kRadius, -rate * kRadius);
   const WheelRows terrain = rows_of(x, turn, {0.0, rate, 0.0});
   CHECK(terrain.residual.norm() < 1e-12);
   CHECK(std::abs(terrain.wheel_speed) < 1e-12);
@@ -83,22 +83,22 @@ TEST_CASE("wheels: the wheel that rolls and the gyroscope tell the speed when th
   State x = simple_state();
   x.imu.v_W = {0.5, 0.0, 0.0};
   const double rate = 0.8;
-  const double left = 0.5 - 0.5 * kSeparation * rate, right = 0.5 + 0.5 * kSeparation * rate;
+  const double left = 0.5 - 0.5 * kTrackWidth * rate, right = 0.5 + 0.5 * kTrackWidth * rate;
   WheelRows rows = rows_of(x, rims(0.0, right), {0.0, 0.0, rate});
   CHECK(std::abs(rows.residual(WheelRows::speed)) > 0.1);
-  rows.take_one_wheel(0.5 * kSeparation);
+  rows.take_one_wheel(0.5 * kTrackWidth);
   CHECK(std::abs(rows.residual(WheelRows::speed)) < 1e-12);
   rows = rows_of(x, rims(left, 0.0), {0.0, 0.0, rate});
-  rows.take_one_wheel(-0.5 * kSeparation);
+  rows.take_one_wheel(-0.5 * kTrackWidth);
   CHECK(std::abs(rows.residual(WheelRows::speed)) < 1e-12);
 }
 
 TEST_CASE("wheels: the Jacobian of one wheel is the derivative, and knows nothing of the other's radius") {
   std::mt19937_64 rng{52};
-  const WheelTurn turn = rims(0.4, 0.55);
+  const WheelIncrement turn = rims(0.4, 0.55);
   const State x = random_state(rng, 0);
   const Eigen::Vector3d gyro_B = random_vector(rng, 0.5);
-  const double lever = 0.5 * x.odometer.wheel_separation;
+  const double lever = 0.5 * x.odometer.track_width;
   WheelRows rows = rows_of(x, turn, gyro_B, OdometerModel::gyro);
   rows.take_one_wheel(lever);
   const auto prediction = [&](const Eigen::VectorXd& part) -> Eigen::VectorXd {
@@ -106,8 +106,8 @@ TEST_CASE("wheels: the Jacobian of one wheel is the derivative, and knows nothin
     d.head(part.size()) = part;
     const State moved = boxplus(x, d);
     const WheelRows both = rows_of(moved, turn, gyro_B, OdometerModel::gyro);
-    return -Eigen::VectorXd::Constant(1, both.residual(WheelRows::speed) + 0.5 * moved.odometer.wheel_separation *
-                                                                               both.residual(WheelRows::yaw_rate));
+    return -Eigen::VectorXd::Constant(
+        1, both.residual(WheelRows::speed) + 0.5 * moved.odometer.track_width * both.residual(WheelRows::yaw_rate));
   };
   Eigen::MatrixXd H = Eigen::MatrixXd::Zero(1, err::camera);
   H.rightCols<kGroundColumns>() = rows.H.row(WheelRows::speed);
@@ -118,7 +118,7 @@ TEST_CASE("wheels: the Jacobian of one wheel is the derivative, and knows nothin
 
 TEST_CASE("wheels: Jacobians of every model are the derivatives") {
   std::mt19937_64 rng{51};
-  WheelTurn turn = rims(0.4, 0.55);
+  WheelIncrement turn = rims(0.4, 0.55);
   for (const bool normal_known : {true, false}) {
     for (const OdometerModel model : {OdometerModel::terrain, OdometerModel::gyro}) {
       const State x = random_state(rng, 0);

@@ -34,7 +34,7 @@ TEST_CASE("detector: corners are spread over the image, and apart") {
   }
 }
 
-TEST_CASE("detector: holes are filled first, what is taken is left alone") {
+TEST_CASE("detector: gaps are filled first, what is taken is left alone") {
   Detector detector(320, 240, kWanted);
   const ImagePyramid image = pyramid_of(random_texture(320, 240, 2));
   std::vector<Eigen::Vector2f> taken;
@@ -43,12 +43,12 @@ TEST_CASE("detector: holes are filled first, what is taken is left alone") {
   }
   const auto corners = detector.detect(image, taken, 40);
   REQUIRE(corners.size() == 40);
-  int in_the_hole = 0;
+  int in_the_gap = 0;
   for (const Corner& corner : corners) {
-    in_the_hole += corner.pixel.x() > 150.0F ? 1 : 0;
+    in_the_gap += corner.pixel.x() > 150.0F ? 1 : 0;
     for (const auto& t : taken) CHECK((corner.pixel - t).norm() >= 10.0F);
   }
-  CHECK(in_the_hole >= 36);
+  CHECK(in_the_gap >= 36);
 }
 
 TEST_CASE("detector: weak texture still gives corners, none gives none") {

@@ -67,9 +67,10 @@ Result search_all(const Pair& pair) {
     }
     if (error < 0.5) {
       const double per_pixel = matcher.inverse_depth_per_pixel();
-      const double inverse_depth = match->facet.inverse_depth(*ray);
+      const double inverse_depth = match->surface.inverse_depth(*ray);
       CHECK(std::abs(inverse_depth - 1.0 / point->z()) < per_pixel);
-      const Facet shifted = Facet::through(*ray, inverse_depth + 0.5 * per_pixel, match->facet.gradient());
+      const SurfacePatch shifted =
+          SurfacePatch::through(*ray, inverse_depth + 0.5 * per_pixel, match->surface.gradient());
       const auto again = matcher.follow(pair.right, patch, {corner.pixel}, *ray, shifted);
       if (again && (again->right - match->right).norm() < 0.1 / 200.0) ++result.followed;
     }
@@ -116,9 +117,9 @@ TEST_CASE("stereo: what is followed tells how the surface leans") {
       if (!ray || ray->y() < 0.2 || !patch.capture(pair.left, corner.pixel)) continue;
       auto match = matcher.search(pair.right, patch, {corner.pixel}, *ray);
       for (int frame = 0; match && frame < 3; ++frame) {
-        match = matcher.follow(pair.right, patch, {corner.pixel}, *ray, match->facet);
+        match = matcher.follow(pair.right, patch, {corner.pixel}, *ray, match->surface);
       }
-      if (match) gradients.push_back(match->facet.gradient().y());
+      if (match) gradients.push_back(match->surface.gradient().y());
     }
     REQUIRE(gradients.size() > 20);
     std::nth_element(gradients.begin(), gradients.begin() + static_cast<std::ptrdiff_t>(gradients.size() / 2),
@@ -161,8 +162,8 @@ TEST_CASE("stereo: what is followed must be where it was") {
   ReferencePatch patch;
   REQUIRE(patch.capture(pair.left, pixel));
   const Eigen::Vector2d ray = *Lens(pair.cameras[0]).to_normalized(pixel.cast<double>());
-  CHECK(matcher.follow(pair.right, patch, {pixel}, ray, Facet::through(ray, 1.0)));
-  CHECK_FALSE(matcher.follow(pair.right, patch, {pixel}, ray, Facet::through(ray, 3.0)));
+  CHECK(matcher.follow(pair.right, patch, {pixel}, ray, SurfacePatch::through(ray, 1.0)));
+  CHECK_FALSE(matcher.follow(pair.right, patch, {pixel}, ray, SurfacePatch::through(ray, 3.0)));
 }
 
 TEST_CASE("stereo: two cameras in one place are refused") {

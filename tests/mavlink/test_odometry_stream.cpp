@@ -149,10 +149,10 @@ TEST_CASE("mavlink stream: what inertia alone carries on is lost after a quarter
 
 TEST_CASE("mavlink stream: the quality is the estimator's; weak is low quality, with hysteresis, or a missing sensor") {
   OdometryStream stream = make_stream();
-  const auto after = [&](double t, int quality, bool untrusted = false) {
+  const auto after = [&](double t, int quality, bool faulty = false) {
     Estimate estimate = estimate_at(t);
     estimate.health.quality = quality;
-    estimate.health.untrusted[index_of(Source::wheel_left)] = untrusted;
+    estimate.health.faulty[index_of(Source::wheel_left)] = faulty;
     const auto message = stream.add_frame(estimate, Status::tracking);
     REQUIRE(message);
     CHECK(message->quality == quality);
@@ -184,8 +184,8 @@ TEST_CASE("mavlink stream: every state of health has a text that fits, and names
       CHECK(to_text(health, sources).text.size() <= StatusText::kMaxLength);
     }
   }
-  SourceSet untrusted;
-  untrusted.set(index_of(Source::camera_right));
-  untrusted.set(index_of(Source::gyroscope));
-  CHECK(to_text(LinkHealth::weak, untrusted).text == "ear: without cameras, gyro");
+  SourceSet faulty;
+  faulty.set(index_of(Source::camera_right));
+  faulty.set(index_of(Source::gyroscope));
+  CHECK(to_text(LinkHealth::weak, faulty).text == "ear: without cameras, gyro");
 }

@@ -63,7 +63,7 @@ ear_calibration to_c(const Calibration& from) {
     to.counts_wrap = from.encoder->wraps ? 1 : 0;
     to.wheel_radius[0] = from.encoder->wheel_radius[0];
     to.wheel_radius[1] = from.encoder->wheel_radius[1];
-    to.wheel_separation = from.encoder->wheel_separation;
+    to.track_width = from.encoder->track_width;
     to.encoder_noise_counts = from.encoder->noise_counts;
   }
   if (from.lasers) {
@@ -223,7 +223,7 @@ TEST_CASE("C interface: estimates are those of class Odometry, bit for bit") {
   REQUIRE(ear_health_of(odometry.get(), &health) == EAR_OK);
   CHECK(health.status == EAR_HEALTH_TRACKING);
   CHECK(health.aiding == EAR_AIDING_CAMERAS_AND_WHEELS);
-  CHECK(health.untrusted == 0);
+  CHECK(health.faulty == 0);
   CHECK(health.quality == expected.back().health.quality);
   CHECK(health.horizontal_sigma == expected.back().health.horizontal_sigma);
   CHECK(health.vertical_sigma == expected.back().health.vertical_sigma);
@@ -251,7 +251,7 @@ TEST_CASE("C interface: before the start the health says so, and after a gap whi
   static_cast<void>(ear_step(odometry.get(), sample.t_ns, &estimate));
   REQUIRE(ear_health_of(odometry.get(), &health) == EAR_OK);
   CHECK(health.status == EAR_HEALTH_DEGRADED);
-  CHECK((health.untrusted >> EAR_SOURCE_GYROSCOPE & 1U) == 1);
+  CHECK((health.faulty >> EAR_SOURCE_GYROSCOPE & 1U) == 1);
   CHECK(health.onset_ns[EAR_SOURCE_GYROSCOPE] > 0);
   CHECK(std::string(ear_source_text(EAR_SOURCE_GYROSCOPE)) == "gyroscope");
   CHECK(std::string(ear_source_text(EAR_SOURCE_COUNT)) == "unknown source");

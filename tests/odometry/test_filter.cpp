@@ -251,10 +251,10 @@ TEST_CASE("filter: wild observations do no harm") {
   CHECK(Solver(filter.covariance().matrix()).eigenvalues().minCoeff() > -1e-9);
 }
 
-TEST_CASE("filter: a hole in the inertial data is counted and survived") {
+TEST_CASE("filter: a gap in the inertial data is counted and survived") {
   const simulator::Simulation simulation = simulate("flat1", 15.0);
   Filter filter(FilterConfig{}, simulation.calibration());
-  struct WithHole {
+  struct WithGap {
     Filter& filter;
     TimeNs start;
     void add_imu(const ImuSample& sample) {
@@ -264,7 +264,7 @@ TEST_CASE("filter: a hole in the inertial data is counted and survived") {
     void add_encoder(const EncoderSample& sample) { filter.add_encoder(sample); }
     void add_laser(const LaserSample& sample) { filter.add_laser(sample); }
   };
-  WithHole receiver{filter, simulation.imu().front().t_ns};
+  WithGap receiver{filter, simulation.imu().front().t_ns};
   experiments::SampleFeed feed(simulation);
   std::optional<Estimate> estimate;
   for (std::size_t i = 0; i < simulation.frame_times().size(); ++i) {
@@ -288,7 +288,7 @@ TEST_CASE("filter: settings and calibrations that cannot be are refused by name"
   CHECK_THROWS_AS(Filter(FilterConfig{}, calibration), std::invalid_argument);
   calibration.cameras.clear();
   CHECK_NOTHROW(Filter(FilterConfig{}, calibration));  // wheels are enough
-  calibration.encoder->wheel_separation = 0.0;
+  calibration.encoder->track_width = 0.0;
   CHECK_THROWS_AS(Filter(FilterConfig{}, calibration), std::invalid_argument);
   calibration.encoder.reset();
   CHECK_THROWS_AS(Filter(FilterConfig{}, calibration), std::invalid_argument);

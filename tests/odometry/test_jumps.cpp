@@ -1,4 +1,4 @@
-// Jumps and holes of the inertial sensors, the images and the clocks, for five seconds, on feature tracks.
+// Jumps and gaps of the inertial sensors, the images and the clocks, for five seconds, on feature tracks.
 #include <doctest/doctest.h>
 
 #include <cstdint>
@@ -37,7 +37,7 @@ Outcome run(const std::string& sequence, const std::string& fault, std::uint64_t
                                     if (health.status == HealthStatus::lost)
                                       outcome.lost += seconds_between(last_ns, t_ns);
                                     if (t > kFault && t < kFault + 1.0)
-                                      outcome.named = outcome.named || health.untrusted.any();
+                                      outcome.named = outcome.named || health.faulty.any();
                                     last_ns = t_ns;
                                   });
   REQUIRE(figures.ate_rmse.has_value());
@@ -77,7 +77,7 @@ TEST_CASE("jumps: in flight an image that stays is as good as none") {
   }
 }
 
-TEST_CASE("jumps: in flight a clock that leaps, and images that come late, cost little and are announced") {
+TEST_CASE("jumps: in flight a clock that jumps, and images that come late, cost little and are announced") {
   const double clean = run("fly1", "").ate;
   for (const std::string fault : {"clock_jump.camera", "clock_jump.imu", "camera_late"}) {
     expect_cheap("fly1", fault, clean, 1.5);

@@ -91,7 +91,7 @@ TEST_CASE("live state: one older than all samples is not used, and none lasts fo
   CHECK(last == 15 + static_cast<int>(LiveState::kLongest / 5e-3));
 }
 
-TEST_CASE("live state: samples that cannot be change nothing; stamps that leap wait for the estimator") {
+TEST_CASE("live state: samples that cannot be change nothing; stamps that jump wait for the estimator") {
   LiveState live(kSamples);
   live.add(sample_at(0));
   live.tell(truth_at(0), 0);
@@ -106,11 +106,11 @@ TEST_CASE("live state: samples that cannot be change nothing; stamps that leap w
   live.add(sample_at(2 * kPeriod));
   check(live.state(), 2 * kPeriod);
 
-  ImuSample leapt = sample_at(3 * kPeriod);
-  leapt.t_ns -= 1'000'000'000;
-  live.add(leapt);
+  ImuSample jumped = sample_at(3 * kPeriod);
+  jumped.t_ns -= 1'000'000'000;
+  live.add(jumped);
   CHECK_FALSE(live.state());
-  live.tell(truth_at(3 * kPeriod), leapt.t_ns);  // the estimator's time goes on
+  live.tell(truth_at(3 * kPeriod), jumped.t_ns);  // the estimator's time goes on
   ImuSample next = sample_at(4 * kPeriod);
   next.t_ns -= 1'000'000'000;
   live.add(next);

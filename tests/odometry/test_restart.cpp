@@ -143,7 +143,7 @@ TEST_CASE("restart: after the state or its covariance turned into no numbers, st
   using Spoil = std::function<void(Filter&)>;
   const std::vector<Spoil> spoils{
       [](Filter& f) { const_cast<State&>(f.state()).imu.v_W.y() = kNaN; },
-      [](Filter& f) { const_cast<State&>(f.state()).odometer.wheel_separation = kNaN; },
+      [](Filter& f) { const_cast<State&>(f.state()).odometer.track_width = kNaN; },
       [](Filter& f) { const_cast<Covariance&>(f.covariance()).widen(err::b_a, Eigen::Matrix3d::Constant(kNaN)); }};
   for (const char* sequence : {"static", "flat1", "fly1"}) {
     CAPTURE(sequence);

@@ -65,7 +65,7 @@ Eigen::Vector3d normal_at_wheels_W(const simulator::Truth& truth, const EncoderC
   const Eigen::Vector3d p_WO = truth.p_WB + truth.R_WB * axle.T_BO.translation();
   Eigen::Vector3d sum_W = Eigen::Vector3d::Zero();
   for (const double side : {0.5, -0.5}) {
-    const Eigen::Vector3d centre_W = p_WO + side * axle.wheel_separation * y_W;
+    const Eigen::Vector3d centre_W = p_WO + side * axle.track_width * y_W;
     Eigen::Vector3d n_W = truth.n_W;
     for (int i = 0; i < 5; ++i) {  // the contact lies below the centre, along the normal in the wheel's own plane
       const Eigen::Vector3d up_W = (n_W - n_W.dot(y_W) * y_W).normalized();
@@ -97,7 +97,7 @@ Errors displacement_errors(const simulator::Simulation& simulation, Normal norma
   for (const ImuSample& sample : simulation.imu()) imu.push(sample);
   WheelModel wheels;
   wheels.radius = {axle.wheel_radius[0], axle.wheel_radius[1]};
-  wheels.separation = with_roll ? axle.wheel_separation : 0.0;
+  wheels.track_width = with_roll ? axle.track_width : 0.0;
   wheels.y_B = axle.T_BO.linear().col(1);
   WheelPreintegration integration(wheels, WheelNoise{});
 

@@ -110,7 +110,7 @@ class Circle {
       return static_cast<std::int64_t>(
           std::llround(way / (2.0 * M_PI * radius) * static_cast<double>(axle.resolution)));
     };
-    const double half = 0.5 * axle.wheel_separation;  // it turns to the left: the left wheel's way is the shorter one
+    const double half = 0.5 * axle.track_width;  // it turns to the left: the left wheel's way is the shorter one
     return {t_ns, count(half, axle.wheel_radius[0]), count(-half, axle.wheel_radius[1])};
   }
 

@@ -80,7 +80,7 @@ TEST_CASE("calibration: all keys of sensor.yaml") {
   CHECK(c.encoder->resolution == 4096);
   CHECK(c.encoder->wraps);
   CHECK(c.encoder->wheel_radius == std::array<double, 2>{0.075, 0.076});
-  CHECK(c.encoder->wheel_separation == 0.4);
+  CHECK(c.encoder->track_width == 0.4);
   CHECK(c.encoder->noise_counts == 2.0);
   REQUIRE(c.lasers);
   REQUIRE(c.lasers->beams.size() == 3);

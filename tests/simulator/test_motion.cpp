@@ -123,7 +123,7 @@ double worst_contact(const Simulation& simulation) {
     const Kinematics motion = simulation.plan().trajectory.at(motion_time(t_ns));
     for (const double side : {0.5, -0.5}) {
       const Eigen::Vector3d axle_W = motion.R_WO.col(1);
-      const Eigen::Vector3d centre_W = motion.p_WO + side * axle.wheel_separation * axle_W;
+      const Eigen::Vector3d centre_W = motion.p_WO + side * axle.track_width * axle_W;
       worst = std::max(worst,
                        std::abs(deepest_by_search(simulation.scene().terrain, centre_W, axle_W, axle.wheel_radius[0])));
     }

@@ -79,7 +79,7 @@ TEST_CASE("recording: the reader gets back calibration and samples") {
   CHECK((read.encoder->T_BO.matrix() - told.encoder->T_BO.matrix()).norm() < 1e-9);
   CHECK(read.encoder->wheel_radius[0] == doctest::Approx(told.encoder->wheel_radius[0]).epsilon(1e-8));
   CHECK(read.encoder->wheel_radius[1] == doctest::Approx(told.encoder->wheel_radius[1]).epsilon(1e-8));
-  CHECK(read.encoder->wheel_separation == doctest::Approx(told.encoder->wheel_separation).epsilon(1e-8));
+  CHECK(read.encoder->track_width == doctest::Approx(told.encoder->track_width).epsilon(1e-8));
   CHECK(read.encoder->wraps);
   CHECK(read.imu.gyro_noise == told.imu.gyro_noise);
   CHECK(read.imu.accel_random_walk == told.imu.accel_random_walk);

@@ -410,7 +410,7 @@ TEST_CASE("simulation: the calibration told is wrong by what is promised; the da
 
   CHECK(std::abs(told.encoder->wheel_radius[0] / 0.075 - 1.0) == doctest::Approx(0.003).epsilon(0.06));
   CHECK(std::abs(told.encoder->wheel_radius[1] / 0.075 - 1.0) == doctest::Approx(0.003).epsilon(0.06));
-  CHECK(std::abs(told.encoder->wheel_separation / 0.40 - 1.0) == doctest::Approx(0.003));
+  CHECK(std::abs(told.encoder->track_width / 0.40 - 1.0) == doctest::Approx(0.003));
   CHECK(angle(told.encoder->T_BO.linear(), truth.encoder->T_BO.linear()) == doctest::Approx(0.2));
   for (std::size_t i = 0; i < 3; ++i) {
     const double cosine = told.lasers->beams[i].d_B.dot(truth.lasers->beams[i].d_B);

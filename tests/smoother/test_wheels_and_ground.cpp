@@ -28,7 +28,7 @@ Calibration vehicle() {
 OdometerState odometer_of_vehicle() {
   OdometerState odometer;
   odometer.wheel_radius = {0.075, 0.075};
-  odometer.wheel_separation = 0.4;
+  odometer.track_width = 0.4;
   return odometer;
 }
 
@@ -54,7 +54,7 @@ TEST_CASE("wheel_chain: two displacements in a row are one over both") {
   noise.normal_walk = 0.1;
   WheelModel wheels;
   wheels.radius = {0.075, 0.0748};
-  wheels.separation = 0.4;
+  wheels.track_width = 0.4;
   const Eigen::Vector3d b_g = random_vector(rng, 0.01);
   const std::vector<ear::test::WheelInterval> drive = ear::test::random_drive(rng, 20);
   const std::vector<ear::test::WheelInterval> before(drive.begin(), drive.begin() + 8);

@@ -56,7 +56,7 @@ struct Arguments {
 struct Change {
   double t = 0.0;  ///< [s] of the motion
   HealthStatus status = HealthStatus::initialising;
-  SourceSet untrusted;
+  SourceSet faulty;
   std::string text;
 
   [[nodiscard]] bool complains() const { return status == HealthStatus::degraded || status == HealthStatus::lost; }
@@ -70,7 +70,7 @@ struct Log {
 
   void add(double t, const Health& health) {
     const std::string text = to_text(health);
-    if (changes.empty() || changes.back().text != text) changes.push_back({t, health.status, health.untrusted, text});
+    if (changes.empty() || changes.back().text != text) changes.push_back({t, health.status, health.faulty, text});
     if (health.status == HealthStatus::lost) lost += t - duration;
     duration = t;
   }
@@ -275,7 +275,7 @@ class Causes {
   /// Did what is not trusted err a moment ago?
   [[nodiscard]] bool explain(const Change& change) const {
     for (std::size_t source = 0; source < kSourceCount; ++source) {
-      if (change.untrusted[source] && !errs(static_cast<Source>(source), change.t)) return false;
+      if (change.faulty[source] && !errs(static_cast<Source>(source), change.t)) return false;
     }
     return change.status != HealthStatus::lost;
   }

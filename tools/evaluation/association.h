@@ -12,7 +12,7 @@ namespace ear::evaluation {
 struct Match {
   std::size_t index = 0;  ///< into the estimate
   Pose truth;             ///< interpolated, with the estimate's time
-  int segment = 0;        ///< counts up at each hole of the estimate or of the truth: same number, no hole between
+  int segment = 0;        ///< counts up at each gap of the estimate or of the truth: same number, no gap between
 };
 
 struct Association {
@@ -31,7 +31,7 @@ struct Association {
 /// Truth at every estimated time that it covers; never extrapolated, never across one of its gaps.
 [[nodiscard]] Association associate(const Trajectory& estimate, const Trajectory& truth);
 
-/// Share of the truth's time, its gaps left out, in which the estimate runs without a hole. In [0, 1].
+/// Share of the truth's time, its gaps left out, in which the estimate runs without a gap. In [0, 1].
 [[nodiscard]] double coverage(const Association& association, const Trajectory& truth);
 
 }  // namespace ear::evaluation

@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kLengthStep = 0.1;                                // [m] of distance_travelled()
 constexpr std::array<double, 4> kDistances{1.0, 5.0, 10.0, 20.0};  // [m] of RelativeError
-constexpr double kLongestStretch = 1.5;                            // times the distance: longer ones have a hole
+constexpr double kLongestStretch = 1.5;                            // times the distance: longer ones have a gap
 
 Eigen::Isometry3d isometry(const Pose& pose) { return Eigen::Translation3d(pose.p_WB) * pose.q_WB; }
 

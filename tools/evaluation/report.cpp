@@ -33,7 +33,7 @@ double seconds_since_start(const Trajectory& truth, const Frame& frame) {
   return seconds_between(truth.front().t_ns, frame.match.truth.t_ns);
 }
 
-/// A curve over all frames of an entry, interrupted where the estimate or the truth has a hole.
+/// A curve over all frames of an entry, interrupted where the estimate or the truth has a gap.
 Curve curve_of(std::size_t index, const ReportEntry& entry, const Value& x, const Value& y) {
   Curve curve{colour(index), entry.evaluation.name, {}};
   int segment = entry.evaluation.frames.front().match.segment;

@@ -80,7 +80,7 @@ document.querySelectorAll('.legend button').forEach(button => button.addEventLis
 const readout = document.getElementById('readout');
 const numbers = (svg, name) => svg.dataset[name].split(' ').map(Number);
 
-// y of the curve's point nearest to pixel column x, or nothing where the curve has a hole.
+// y of the curve's point nearest to pixel column x, or nothing where the curve has a gap.
 function yAt(polyline, x) {
   const points = polyline.points;
   let low = 0, high = points.numberOfItems - 1;

@@ -7,7 +7,7 @@
 #include "ear/calibration.h"
 #include "ear/filter_config.h"
 #include "ear/health.h"
-#include "ear/odometry.h"
+#include "src/odometry_factory.h"
 #include "tools/evaluation/evaluate.h"
 #include "tools/simulator/simulation.h"
 

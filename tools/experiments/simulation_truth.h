@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "ear/odometry.h"
+#include "ear/estimate.h"
 #include "tools/evaluation/trajectory.h"
 #include "tools/simulator/simulation.h"
 

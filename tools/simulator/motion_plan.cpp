@@ -233,7 +233,7 @@ MotionPlan plan_motion(const Sequence& sequence, const EncoderCalibration& axle,
   const Oscillation bobbing = draw_oscillation(rng, 0.3, 0.6);
 
   // First the axle's place and its pose on the ground below.
-  const GroundPath ground(sequence.terrain, {axle.wheel_radius, axle.wheel_separation});
+  const GroundPath ground(sequence.terrain, {axle.wheel_radius, axle.track_width});
   Eigen::Matrix<double, 6, Eigen::Dynamic> states(6, n);
   Eigen::Vector2d p = sequence.start;
   double yaw = sequence.heading;

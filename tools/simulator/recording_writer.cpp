@@ -127,7 +127,7 @@ void write_encoder(const Simulation& simulation, const fs::path& folder) {
   yaml.print("resolution: %lld\nwraps: %s\n", static_cast<long long>(encoder.resolution),
              encoder.wraps ? "true" : "false");
   yaml.print("wheel_radius: [%.9g, %.9g]  # left, right [m]\n", encoder.wheel_radius[0], encoder.wheel_radius[1]);
-  yaml.print("wheel_separation: %.9g\nnoise_counts: %g\n", encoder.wheel_separation, encoder.noise_counts);
+  yaml.print("wheel_separation: %.9g\nnoise_counts: %g\n", encoder.track_width, encoder.noise_counts);
   yaml.close();
 
   TextFile csv(folder / "data.csv");

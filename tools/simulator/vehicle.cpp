@@ -99,7 +99,7 @@ Calibration miscalibrate(Calibration calibration, Rng& rng) {
   const double radius_difference = random_sign(rng) * kRadiusDifference;
   encoder.wheel_radius[0] *= 1.0 + radius_error + 0.5 * radius_difference;
   encoder.wheel_radius[1] *= 1.0 + radius_error - 0.5 * radius_difference;
-  encoder.wheel_separation *= 1.0 + random_sign(rng) * kScaleError;
+  encoder.track_width *= 1.0 + random_sign(rng) * kScaleError;
   encoder.T_BO.linear() = random_rotation(rng, kMountingError) * encoder.T_BO.linear();
 
   for (LaserBeam& beam : calibration.lasers->beams) {

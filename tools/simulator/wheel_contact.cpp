@@ -54,7 +54,7 @@ double disc_penetration(const Terrain& terrain, const Eigen::Vector3d& centre_W,
 
 AxlePose rest_on_ground(const Terrain& terrain, const AxleGeometry& axle, double x, double y, double yaw,
                         const AxlePose& guess) {
-  const double half = 0.5 * axle.separation;
+  const double half = 0.5 * axle.track_width;
   AxlePose pose = guess;
   for (int i = 0; i < 10; ++i) {
     const Eigen::Vector3d axle_W = axle_direction(yaw, pose.roll);

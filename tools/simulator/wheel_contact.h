@@ -11,7 +11,7 @@ namespace ear::simulator {
 /// The wheels are thin discs, perpendicular to the axle.
 struct AxleGeometry {
   std::array<double, 2> wheel_radius{};  ///< left, right [m]
-  double separation = 0.0;               ///< [m]
+  double track_width = 0.0;              ///< [m]
 };
 
 /// Unit vector along the axle, to the left, at this yaw and roll.

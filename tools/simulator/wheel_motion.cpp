@@ -18,7 +18,7 @@ std::array<double, 2> rolling_rates(const Kinematics& motion, const Terrain& ter
   const Eigen::Vector3d omega_W = motion.R_WO * motion.omega_O;
   std::array<double, 2> rates{};
   for (std::size_t wheel = 0; wheel < 2; ++wheel) {
-    const double side = (wheel == 0 ? 0.5 : -0.5) * axle.wheel_separation;
+    const double side = (wheel == 0 ? 0.5 : -0.5) * axle.track_width;
     const double radius = axle.wheel_radius[wheel];
     const Eigen::Vector3d centre_W = motion.p_WO + side * axle_W;
     const Eigen::Vector3d v_W = motion.v_O_W + side * omega_W.cross(axle_W);

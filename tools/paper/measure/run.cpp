@@ -122,7 +122,8 @@ Result run_on_images(const std::filesystem::path& recording, double camera_rate_
   RecordingOptions options;
   options.camera_rate_hz = camera_rate_hz;
   Recording samples(recording, options);
-  Odometry odometry(configuration.config, told(configuration, samples.calibration()), maker_of(configuration));
+  Odometry odometry =
+      OdometryFactory::make(configuration.config, told(configuration, samples.calibration()), maker_of(configuration));
   Record record;
   double begin = 0.0;
   const auto before_sample = [&](const Sample&) {

@@ -1,4 +1,4 @@
-#include "frontend/facet.h"
+#include "frontend/surface_patch.h"
 
 #include <Eigen/LU>
 
@@ -7,12 +7,12 @@ namespace {
 
 constexpr double kStepPx = 4.0;          // of finite differences through the lenses
 constexpr double kMinDepthRatio = 1e-3;  // of a point's depths in the two cameras
-constexpr double kMinHeightRatio = 0.1;  // of the cameras' heights above a facet: closer, it is seen edge-on
+constexpr double kMinHeightRatio = 0.1;  // of the cameras' heights above a surface patch: closer, it is seen edge-on
 constexpr double kSteepest = 20.0;       // largest gradient of inverse depth over itself: seen at 3 degrees
 
 }  // namespace
 
-Facet Facet::through(const Eigen::Vector2d& ray, double inverse_depth, const Eigen::Vector2d& gradient) {
+SurfacePatch SurfacePatch::through(const Eigen::Vector2d& ray, double inverse_depth, const Eigen::Vector2d& gradient) {
   const double length = gradient.norm();
   const double longest = kSteepest * inverse_depth;
   const Eigen::Vector2d g = length > longest ? Eigen::Vector2d(gradient * (longest / length)) : gradient;
@@ -20,7 +20,8 @@ Facet Facet::through(const Eigen::Vector2d& ray, double inverse_depth, const Eig
 }
 
 // n . X = 1 and X1 = R X + p give (R n) . X1 = 1 + (R n) . p.
-Facet Facet::seen_after(const Transfer& motion, const Eigen::Vector2d& ray, const Eigen::Vector2d& found) const {
+SurfacePatch SurfacePatch::seen_after(const Transfer& motion, const Eigen::Vector2d& ray,
+                                      const Eigen::Vector2d& found) const {
   const double before = inverse_depth(ray);
   const double after = before / motion.scaled_point(ray, before).z();
   const Eigen::Vector3d turned = motion.R_10 * n;
@@ -29,9 +30,9 @@ Facet Facet::seen_after(const Transfer& motion, const Eigen::Vector2d& ray, cons
   return through(found, after, turned.head<2>() / height_ratio);
 }
 
-std::optional<Warp> carry_over(const Warp& warp, const Eigen::Vector2d& ray, const Facet& facet, const Transfer& motion,
-                               const Lens& from, const Lens& to) {
-  const Eigen::Matrix3d H = motion.R_10 + motion.p_10 * facet.n.transpose();
+std::optional<Warp> carry_over(const Warp& warp, const Eigen::Vector2d& ray, const SurfacePatch& surface,
+                               const Transfer& motion, const Lens& from, const Lens& to) {
+  const Eigen::Matrix3d H = motion.R_10 + motion.p_10 * surface.n.transpose();
   const auto move = [&](const Eigen::Vector2d& x) -> std::optional<Eigen::Vector2d> {
     const Eigen::Vector3d point = H * x.homogeneous();
     if (!(point.z() > kMinDepthRatio)) return std::nullopt;

@@ -1,4 +1,4 @@
-#include "frontend/facet.h"
+#include "frontend/surface_patch.h"
 
 #include <doctest/doctest.h>
 
@@ -13,7 +13,7 @@ namespace ear {
 namespace {
 
 // A floor 0.25 m below the first camera, and how that camera rolls towards it.
-const Facet kFloor{{0.0, 4.0, 0.0}};
+const SurfacePatch kFloor{{0.0, 4.0, 0.0}};
 const Eigen::Vector2d kRay(0.1, 0.3);
 
 Transfer forward(double distance) {
@@ -26,9 +26,10 @@ Transfer chained(const Transfer& first, const Transfer& second) {
 }
 
 // Where another camera sees what this one sees at a pixel, by way of the point in space.
-Eigen::Vector2d moved(const Eigen::Vector2d& pixel, const Facet& facet, const Transfer& motion, const Lens& lens) {
+Eigen::Vector2d moved(const Eigen::Vector2d& pixel, const SurfacePatch& surface, const Transfer& motion,
+                      const Lens& lens) {
   const Eigen::Vector3d ray = lens.to_normalized(pixel)->homogeneous();
-  const Eigen::Vector3d point = ray / facet.n.dot(ray);
+  const Eigen::Vector3d point = ray / surface.n.dot(ray);
   return *lens.to_pixel((motion.R_10 * point + motion.p_10).hnormalized());
 }
 
@@ -42,42 +43,42 @@ const std::array<Eigen::Vector2f, 5> kOffsets{
 
 }  // namespace
 
-TEST_CASE("facet: one through a point has its inverse depth there, and its gradient beside it") {
+TEST_CASE("surface patch: one through a point has its inverse depth there, and its gradient beside it") {
   const Eigen::Vector2d gradient(0.3, -0.5);
-  const Facet facet = Facet::through(kRay, 2.0, gradient);
-  CHECK(facet.inverse_depth(kRay) == doctest::Approx(2.0));
+  const SurfacePatch surface = SurfacePatch::through(kRay, 2.0, gradient);
+  CHECK(surface.inverse_depth(kRay) == doctest::Approx(2.0));
   const Eigen::Vector2d beside(0.02, 0.01);
-  CHECK(facet.inverse_depth(kRay + beside) == doctest::Approx(2.0 + gradient.dot(beside)));
-  CHECK(Facet::through(kRay, 2.0).gradient().norm() == 0.0);
+  CHECK(surface.inverse_depth(kRay + beside) == doctest::Approx(2.0 + gradient.dot(beside)));
+  CHECK(SurfacePatch::through(kRay, 2.0).gradient().norm() == 0.0);
 }
 
-TEST_CASE("facet: one that would be seen edge-on leans less, and one at infinity does not lean") {
-  const Facet steep = Facet::through(kRay, 2.0, {0.0, 500.0});
+TEST_CASE("surface patch: one that would be seen edge-on leans less, and one at infinity does not lean") {
+  const SurfacePatch steep = SurfacePatch::through(kRay, 2.0, {0.0, 500.0});
   CHECK(steep.inverse_depth(kRay) == doctest::Approx(2.0));
   CHECK(steep.gradient().y() == doctest::Approx(40.0));
-  CHECK(Facet::through(kRay, 0.0, {3.0, 4.0}).n.norm() == 0.0);
+  CHECK(SurfacePatch::through(kRay, 0.0, {3.0, 4.0}).n.norm() == 0.0);
 }
 
-TEST_CASE("facet: points of its plane are on the plane that another camera sees") {
+TEST_CASE("surface patch: points of its plane are on the plane that another camera sees") {
   const Transfer motion = forward(0.2);
   const auto in_other = [&](const Eigen::Vector2d& ray) -> Eigen::Vector3d {
     return motion.R_10 * ray.homogeneous() / kFloor.inverse_depth(ray) + motion.p_10;
   };
-  const Facet after = kFloor.seen_after(motion, kRay, in_other(kRay).hnormalized());
+  const SurfacePatch after = kFloor.seen_after(motion, kRay, in_other(kRay).hnormalized());
   for (const Eigen::Vector2d& ray : {kRay, Eigen::Vector2d(-0.3, 0.2), Eigen::Vector2d(0.0, 0.5)}) {
     CHECK(after.n.dot(in_other(ray)) == doctest::Approx(1.0));
   }
 }
 
-TEST_CASE("facet: a camera that has come to its plane keeps the depth and forgets the lean") {
+TEST_CASE("surface patch: a camera that has come to its plane keeps the depth and forgets the lean") {
   const Transfer down{Eigen::Matrix3d::Identity(), {0.0, -0.24, 0.0}};
   const Eigen::Vector2d found(0.12, 0.012);
-  const Facet after = kFloor.seen_after(down, kRay, found);
+  const SurfacePatch after = kFloor.seen_after(down, kRay, found);
   CHECK(after.inverse_depth(found) == doctest::Approx(kFloor.inverse_depth(kRay)));
   CHECK(after.gradient().norm() == 0.0);
 }
 
-TEST_CASE("facet: a warp that is carried over puts every pixel of the patch where its point is seen") {
+TEST_CASE("surface patch: a warp that is carried over puts every pixel of the patch where its point is seen") {
   for (const LensModel model : {LensModel::radial_tangential, LensModel::equidistant}) {
     const Lens lens(test_stereo_pair(model).front());
     const Warp warp{lens.to_pixel(kRay)->cast<float>()};
@@ -98,7 +99,7 @@ TEST_CASE("facet: a warp that is carried over puts every pixel of the patch wher
   }
 }
 
-TEST_CASE("facet: two motions one after the other are as good as one") {
+TEST_CASE("surface patch: two motions one after the other are as good as one") {
   const Lens lens(test_stereo_pair().front());
   const Transfer first = forward(0.1);
   const Transfer second = forward(0.15);
@@ -115,7 +116,7 @@ TEST_CASE("facet: two motions one after the other are as good as one") {
   }
 }
 
-TEST_CASE("facet: what comes to lie behind the camera is not carried over") {
+TEST_CASE("surface patch: what comes to lie behind the camera is not carried over") {
   const Lens lens(test_stereo_pair().front());
   CHECK_FALSE(carry_over({lens.to_pixel(kRay)->cast<float>()}, kRay, kFloor, forward(1.0), lens, lens));
 }
