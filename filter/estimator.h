@@ -2,11 +2,12 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <optional>
 
 #include "ear/estimate.h"
 #include "ear/types.h"
-#include "filter/state.h"
+#include "filter/ekf/state.h"
 
 namespace ear {
 
@@ -25,6 +26,19 @@ struct RelativeMotion {
   motion.translation_known = true;
   return motion;
 }
+
+/// The calibration in use: what was given, with what was learned.
+struct CalibrationState {
+  CameraState camera;
+  OdometerState odometer;
+};
+
+/// Can a frame with this stamp be used?
+enum class FrameStamp : std::uint8_t {
+  usable,
+  not_later,   ///< than the frame before
+  no_samples,  ///< no inertial samples reach (nearly) up to it
+};
 
 /// Meanings, and what is refused: class Filter.
 class Estimator {
@@ -46,13 +60,10 @@ class Estimator {
   virtual void refuse_frame() = 0;
   virtual void set_window(int clones) = 0;
   [[nodiscard]] virtual InputCounts input_counts() const = 0;
-  [[nodiscard]] virtual bool covers(TimeNs t_ns) const = 0;
-  [[nodiscard]] virtual bool is_next(TimeNs t_ns) const = 0;
+  [[nodiscard]] virtual FrameStamp check_stamp(TimeNs t_ns) const = 0;
   [[nodiscard]] virtual TimeNs camera_time(TimeNs imu_time_ns) const = 0;
 
-  /// The calibration in use.
-  [[nodiscard]] virtual CameraState cameras() const = 0;
-  [[nodiscard]] virtual OdometerState odometer() const = 0;
+  [[nodiscard]] virtual CalibrationState calibration() const = 0;
 };
 
 }  // namespace ear

@@ -1,407 +1,277 @@
 #include "filter/filter.h"
 
-#include <algorithm>
 #include <cmath>
+#include <utility>
 
-#include "filter/capacity.h"
-#include "filter/displacements.h"
-#include "filter/ground.h"
-#include "filter/initial_state.h"
+#include "filter/ekf/initial_state.h"
+#include "filter/ekf/propagation.h"
+#include "filter/health/advise.h"
+#include "filter/report.h"
 
 namespace ear {
 namespace {
 
-constexpr std::size_t kImuCapacity = 4096;   // 20 s at 200 Hz, 4 s at 1 kHz
-constexpr std::size_t kWheelCapacity = 512;  // readings that wait for the state to pass them
-constexpr double kRollingWindow = 2.0;       // [s] of samples kept for a start while rolling
-constexpr double kLongestPredict = 0.5;      // [s] beyond the newest sample
-constexpr double kWheelAge = 0.1;            // [s] older readings do not tell whether the wheels rest
-constexpr double kHeldSample = 0.04;         // [s] so far the newest IMU sample may stand in for one that is missing
-constexpr double kLifting = 0.3;             // [s] after wheels that leave the ground, or meet it, as it seems
-constexpr std::size_t kMaxCompared = 512;    // features of a frame whose motion is compared with other sensors
+constexpr double kLongestPredict = 0.5;  // [s] chosen: beyond the newest sample
+constexpr double kJumpNoticed = 0.3;     // [s] chosen: until a bias that jumped is found out
 
-constexpr int kLeastWindow = 3;    // clones
-constexpr int kClonePairRows = 9;  // that a measurement between the state and one clone has
-
-int error_capacity(const FilterConfig& config) { return err::clone(config.window + 1); }
+/// A bias that jumped is as little known as at the start, and took the motion along until it was found out.
+void inflate(const BiasJump& jumped, const PriorConfig& prior, Ekf& ekf) {
+  const double gyro = jumped.gyro ? prior.gyro_bias : 0.0;
+  const double accel = jumped.accel ? prior.accel_bias : 0.0;
+  ekf.inflate_motion(gyro * kJumpNoticed, accel * kJumpNoticed, 0.5 * accel * kJumpNoticed * kJumpNoticed);
+  ekf.inflate_biases(gyro, accel);
+}
 
 }  // namespace
 
 Filter::Filter(const FilterConfig& config, const Calibration& calibration)
     : config_(checked(config)),
       calibration_(checked(calibration)),
-      focal_px_(focal_length(calibration)),
-      beam_count_(calibration.lasers ? static_cast<int>(calibration.lasers->beams.size()) : 0),
-      gate_(config.gate_probability, 4 * (config.window + 1)),
-      covariance_(error_capacity(config)),
-      imu_(kImuCapacity),
-      guard_(calibration, config.max_imu_gap),
-      impact_guard_(config.impact, calibration.imu),
-      turns_(kWheelCapacity),
-      ranges_(kWheelCapacity),
-      displacement_turns_(kWheelCapacity),
-      contact_(config.contact, calibration),
-      standstill_(config.standstill, focal_px_),
-      tracks_(2 * kFeatureCapacity, static_cast<std::size_t>(config.window) + 1),
+      ingest_(config, calibration),
+      ekf_(config, calibration),
+      sources_(config, calibration),
+      start_(config, calibration),
       consistency_check_(config.anomaly),
-      camera_displacement_(config.feature_sigma_px / focal_px_, kMaxCompared),
-      frame_check_(config.feature_sigma_px / focal_px_, gate_(2)),
-      monitor_(calibration, calibration.encoder && config.odometer.model != OdometerModel::none,
-               config.odometer.model == OdometerModel::terrain),
-      moving_start_({config.prior.gyro_bias, config.prior.accel_bias, config.feature_sigma_px / focal_px_}),
-      rows_(kClonePairRows, error_capacity(config)),
-      information_(config.window + 1, config.max_track_updates) {
-  state_.camera = camera_state(calibration);
-  state_.odometer = odometer_state(calibration);
-  if (calibration.encoder && config.odometer.model != OdometerModel::none) encoder_.emplace(*calibration.encoder);
-  set_window(config.window);
-  take_memory();
-}
+      health_(calibration, sources_.uses_wheels(), config.odometer.model == OdometerModel::terrain) {}
 
-void Filter::set_window(int clones) {
-  const int least = std::min(kLeastWindow, config_.window);
-  window_ = static_cast<std::size_t>(std::clamp(clones, least, config_.window));
-}
-
-/// All that process() and the samples will need.
-void Filter::take_memory() {
-  const auto clones = static_cast<std::size_t>(config_.window) + 1;
-  state_.clones.reserve(clones);
-  last_features_.features.reserve(kFeatureCapacity);
-  cameras_.reserve(2 * clones);
-  sightings_.reserve(2 * clones);
-  observations_.reserve(2 * clones);
-  selected_.reserve(2 * kFeatureCapacity);
-  frame_ids_.reserve(kFeatureCapacity);
-  parallax_.reserve(2 * kFeatureCapacity);
-}
-
-TimeNs Filter::imu_time(TimeNs camera_time_ns) const {
-  return camera_time_ns + static_cast<TimeNs>(std::llround(1e9 * state_.camera.time_offset));
-}
-
-TimeNs Filter::camera_time(TimeNs imu_time_ns) const {
-  return imu_time_ns - static_cast<TimeNs>(std::llround(1e9 * state_.camera.time_offset));
-}
-
-bool Filter::is_next(TimeNs t_ns) const { return !any_frame_ || t_ns > last_frame_ns_; }
-
-bool Filter::covers(TimeNs t_ns) const {
-  return is_time(t_ns) && !imu_.empty() && seconds_between(imu_.newest().t_ns, imu_time(t_ns)) < kHeldSample;
-}
-
-void Filter::add_imu(const ImuSample& sample) {
-  clocks_.imu.add(sample);
-  take_waiting_imu();
-}
-
-void Filter::hear(ImuClock::Stream stream, TimeNs t_ns) {
-  const int mended = clocks_.imu.jumps_corrected();
-  clocks_.imu.hear(stream, t_ns);
-  take_waiting_imu();
-  if (clocks_.imu.jumps_corrected() != mended) monitor_.accuse_imu(true, true, imu_.newest().t_ns);
-}
-
-void Filter::take_waiting_imu() {
-  while (const std::optional<ImuSample> sample = clocks_.imu.next()) take_imu(*sample);
-}
-
-/// The newest inertial sample, where that tells the time: not while its clock is in doubt.
-std::optional<TimeNs> Filter::now() const {
-  if (imu_.empty() || clocks_.imu.waiting() || guard_.refuses_imu()) return std::nullopt;
-  return imu_.newest().t_ns;
-}
-
-void Filter::take_imu(const ImuSample& sample) {
-  const ImuVerdict verdict = guard_.judge(sample);
-  if (!verdict.accepted) {
-    monitor_.add_refused_imu();
-    return;
-  }
-  if (verdict.begins_anew) restart(sample.t_ns, verdict.clock_shift);
-  monitor_.add_imu(sample, config_.max_imu_gap);
-  if (!imu_.empty() && verdict.unseen > config_.max_imu_gap) {
-    imu_gap_ = ImuGap{imu_.newest().t_ns, sample.t_ns, verdict.unseen};
-  }
-  // Without frames for long, the state moves on before its samples are overwritten.
-  if (status_ == Status::tracking && imu_.size() == kImuCapacity && state_.imu.t_ns < imu_[kImuCapacity / 2].t_ns) {
-    advance(imu_[kImuCapacity / 2].t_ns);
-  }
-  mend_spike(sample);
-  const ImuNoiseFactors noise = impact_guard_.add(sample);
-  imu_.doubt_newest(static_cast<std::size_t>(impact_guard_.clipped_before()), noise);
-  imu_.push(sample, noise);
-  if (encoder_) note_contact(contact_.add_imu(sample));
-}
-
-std::optional<TimeNs> Filter::state_time() const {
-  return status_ == Status::tracking ? std::optional(state_.imu.t_ns) : std::nullopt;
-}
-
-void Filter::add_encoder(const EncoderSample& given) {
-  if (!encoder_) return;
-  hear(ImuClock::Stream::encoder, given.t_ns);
-  EncoderSample sample = given;
-  const std::optional<TimeNs> stamp = clocks_.encoder.correct(given.t_ns, now());
-  if (stamp) sample.t_ns = *stamp;
-  const Verdict verdict = stamp ? guard_.judge(sample, state_time(), *encoder_) : guard_.refuse_encoder();
-  if (!imu_.empty()) monitor_.add_encoder(sample, verdict, imu_.newest().t_ns);
-  if (verdict != Verdict::accepted) return;
-  note_contact(contact_.add_encoder(sample));
-  const std::optional<WheelIncrement> turn = encoder_->add(sample);
-  if (!turn) return;
-  wheel_rest_.add(*turn);
-  if (status_ == Status::tracking) {
-    if (turns_.full()) advance_measuring(turns_.front().to_ns);  // no frames for long
-  } else {
-    const auto too_old = [&] { return seconds_between(turns_.front().from_ns, turn->to_ns) > kRollingWindow; };
-    while (!turns_.empty() && (turns_.full() || too_old())) turns_.pop();
-  }
-  turns_.push(*turn);
-}
-
-void Filter::add_laser(const LaserSample& sample) {
-  if (!encoder_ || beam_count_ == 0) return;
-  hear(ImuClock::Stream::laser, sample.t_ns);
-  const Verdict verdict = guard_.judge(sample, state_time());
-  if (!imu_.empty()) monitor_.add_laser(sample, verdict, *calibration_.lasers, imu_.newest().t_ns);
-  if (verdict != Verdict::accepted) return;
-  note_contact(contact_.add_laser(sample));
-  if (status_ == Status::tracking) {
-    if (ranges_.full()) advance_measuring(ranges_.front().t_ns);
-  } else {
-    const auto too_old = [&] { return seconds_between(ranges_.front().t_ns, sample.t_ns) > kRollingWindow; };
-    while (!ranges_.empty() && (ranges_.full() || too_old())) ranges_.pop();
-  }
-  ranges_.push(BeamRanges(sample));
-}
-
-std::optional<TimeNs> Filter::common_stamp(TimeNs camera_stamp_ns) {
-  hear(ImuClock::Stream::camera, camera_stamp_ns);
-  if (!is_time(camera_stamp_ns)) return camera_stamp_ns;
-  const std::optional<TimeNs> stamp = clocks_.camera.correct(camera_stamp_ns, now());
-  if (!stamp) monitor_.accuse_cameras(imu_.newest().t_ns);
-  return stamp;
-}
-
-std::optional<RelativeMotion> Filter::motion_to(TimeNs t_ns) const {
-  if (!is_time(t_ns) || !any_image_ || imu_.empty() || t_ns <= last_image_ns_) return std::nullopt;
-  if (status_ != Status::tracking) {
-    RelativeMotion motion;
-    if (const std::optional<Eigen::Vector3d> way = moving_start_.way_to(imu_time(t_ns))) {
-      motion.p_B0B1 = *way;
-      motion.translation_known = true;
-    }
-    Eigen::Matrix3d R_B0B1 = Eigen::Matrix3d::Identity();
-    imu_.for_each_piece(
-        imu_time(last_image_ns_), imu_time(t_ns),
-        [&](const Eigen::Vector3d& gyro_B, const Eigen::Vector3d&, double dt) { R_B0B1 *= exp_so3(gyro_B * dt); });
-    motion.R_B1B0 = R_B0B1.transpose();
-    return motion;
-  }
-  return motion_between(image_T_WB_, predict_here(imu_time(t_ns)));
-}
+// ---- What happens to a frame
 
 std::optional<Estimate> Filter::process(const FeatureFrame& given) {
-  if (!is_next(given.t_ns)) return std::nullopt;
-  if (!covers(given.t_ns)) {
-    refuse_frame();
-    return std::nullopt;
+  const FrameStamp stamp = check_stamp(given.t_ns);
+  if (stamp == FrameStamp::no_samples) refuse_frame();
+  if (stamp != FrameStamp::usable) return std::nullopt;
+  const FeatureFrame& frame = ingest_.plausible(given);
+
+  propagate_to(frame);  // start, or compare the sensors (13)-(15) and take in wheels (5)-(8) and lasers (2)-(4)
+
+  FrameAgreement seen;
+  if (ekf_.running()) {
+    if (!frame.repeated) seen = sources_.check(frame, ingest_, ekf_);
+    seen.frozen = frame.repeated;
   }
-  const FeatureFrame& frame = guard_.sound(given);
-  const bool repeats = repeats_last_image(frame);
-  if (repeats && status_ != Status::tracking) noiseless_camera_ = true;
-  const bool frozen = repeats && !noiseless_camera_;
-  const bool still = begin_frame(frame, frozen);
-  FrameAgreement agreement;
-  agreement.frozen = frozen;
-  if (status_ == Status::tracking && !frozen) {
-    bridge(frame);
-    agreement = check_frame(frame);
-  }
-  const bool usable = monitor_.check_image(agreement, imu_time(frame.t_ns), imu_.newest().t_ns);
-  if (status_ == Status::tracking) {
-    if (usable) {
-      use_image(frame, still);
+  const TimeNs t_ns = imu_time(frame.t_ns, ekf_.state().camera);
+  const bool use_image = health_.check_image(seen, t_ns, ingest_.imu().newest().t_ns);
+  if (ekf_.running()) {
+    const Advice advice = advise(consistency_, health_.health(), config_.anomaly);
+    if (use_image) {
+      sources_.use_image(frame, sources_.standstill().stands(), advice, ekf_, records_);
     } else {
-      go_on_blind(still);
+      sources_.go_without_image(advice, ekf_, records_);
     }
-    watch_biases(seconds_between(watched_ns_, state_.imu.t_ns));
+    const BiasJump jumped = bias_watch_.judge(ekf_.take_bias_changes(), ekf_.state().imu.t_ns);
+    if (jumped.any()) inflate(jumped, config_.prior, ekf_);
+    health_.report_imu_fault(jumped.gyro, jumped.accel, ekf_.state().imu.t_ns);
   }
-  watched_ns_ = state_.imu.t_ns;
-  if (usable) {
-    any_image_ = true;
-    last_image_ns_ = frame.t_ns;
-    last_features_ = frame;
-    image_T_WB_ = {state_.imu.R_WB, state_.imu.p_WB};
-    image_rate_B_ = rate_B_;
-  }
-  return finish_frame(true, agreement);
+  if (use_image) sources_.cameras().remember(frame, ekf_);
+  return report(true, seen);
 }
 
-/// What is said of the state, and whether it is given away.
-std::optional<Estimate> Filter::finish_frame(bool image, const FrameAgreement& agreement) {
-  HealthMonitor::Frame frame;
-  frame.t_ns = imu_time(last_frame_ns_);
-  frame.image = image;
-  frame.right = !right_skipped_;
-  frame.running = status_ == Status::tracking;
-  frame.agreement = agreement;
-  frame.statistics = statistics_;
-  frame.lifted = lifted_ns_ && seconds_between(*lifted_ns_, frame.t_ns) < kLifting;
+std::optional<Estimate> Filter::process_without_image(TimeNs t_ns) {
+  if (check_stamp(t_ns) != FrameStamp::usable) return std::nullopt;
+  if (ekf_.running() && sources_.cameras().count() > 0 && !sources_.on_ground()) return std::nullopt;
+  propagate_to(FeatureFrame{t_ns, {}});
+  if (ekf_.running()) {
+    sources_.go_without_image(advise(consistency_, health_.health(), config_.anomaly), ekf_, records_);
+  }
+  return report(false, FrameAgreement{});
+}
+
+void Filter::propagate_to(const FeatureFrame& frame) {
+  const TimeNs t_ns = imu_time(frame.t_ns, ekf_.state().camera);
+  last_frame_ns_ = frame.t_ns;
+  consistency_ = Consistency{};
+  records_ = records_for(frame, records_, sources_.on_ground());
+  sources_.look_at(frame, t_ns, ingest_, ekf_);
+  if (!ekf_.running()) {
+    start(frame, t_ns);
+    return;
+  }
+  consistency_ = consistency_check_(sources_.displacements(frame, t_ns, ingest_, ekf_));
+  sources_.advance(t_ns, advise(consistency_, health_.health(), config_.anomaly), ingest_, ekf_, records_);
+  start_again(frame);
+}
+
+/// What is given away of the state, and whether it is.
+std::optional<Estimate> Filter::report(bool image, const FrameAgreement& agreement) {
   std::optional<Estimate> estimate;
-  if (frame.running) {
-    estimate = make_estimate();
-    frame.possible = possible();
+  const double scale_sigma = start_.scale_is_given() ? config_.prior.wheel_scale : 0.0;
+  if (ekf_.running()) {
+    estimate = make_estimate(ekf_, sources_.ground(), alignment_, scale_sigma, records_, consistency_);
   }
-  if (frame.possible && estimate) {
-    const auto variance = estimate->covariance.diagonal().cwiseMax(0.0);
-    frame.speed = state_.imu.v_W.norm();
-    // As the vehicle sees it, without that of the heading.
-    frame.velocity_sigma = std::sqrt(covariance_.matrix().diagonal().segment<3>(err::nu).cwiseMax(0.0).maxCoeff());
-    frame.horizontal_sigma = std::sqrt(variance.segment<2>(estimate_error::position).maxCoeff());
-    frame.vertical_sigma = std::sqrt(variance(estimate_error::position + 2));
-  }
-  monitor_.add_frame(frame, log_.records());
+  const TimeNs t_ns = imu_time(*last_frame_ns_, ekf_.state().camera);
+  HealthMonitor::Frame frame = health_frame(t_ns, ekf_, sources_, agreement, records_, estimate);
+  frame.image = image;
+  health_.add_frame(frame, records_.log.records());
   if (frame.running && !frame.possible) stop();
-  if (!estimate || !usable()) return std::nullopt;
-  estimate->health = monitor_.health();
+  if (!estimate || !ekf_.running() || !health_.usable()) return std::nullopt;
+  estimate->health = health_.health();
   if (estimate->health.aiding != Aiding::none) last_good_ = estimate;
   return estimate;
 }
 
-/// Are the state and its covariance numbers, and no variance negative?
-bool Filter::possible() const {
-  const ImuState& x = state_.imu;
-  const OdometerState& o = state_.odometer;
-  const auto P = covariance_.matrix();
-  const bool finite = x.R_WB.allFinite() && x.p_WB.allFinite() && x.v_W.allFinite() && x.b_g.allFinite() &&
-                      x.b_a.allFinite() && state_.camera.T_BC0.R.allFinite() && state_.camera.T_BC0.p.allFinite() &&
-                      o.wheel_radius.allFinite() && std::isfinite(o.track_width) && o.T_BO.R.allFinite() &&
-                      state_.ground.n_W.allFinite() && std::isfinite(P.sum());  // one that is not makes the sum so
-  return finite && P.diagonal().minCoeff() >= 0.0;
+// ---- Starts
+
+void Filter::start(const FeatureFrame& frame, TimeNs t_ns) {
+  const ImuStatistics recent = sources_.standstill().recent(ingest_.imu(), t_ns);
+  const bool restarts = without_state_ == Status::lost;
+  if (!restarts) without_state_ = recent.count < 2 ? Status::waiting_for_imu : Status::waiting_for_standstill;
+  const Start::Situation now{
+      frame, t_ns, sources_.standstill().stands(), sources_.on_ground(), restarts, ekf_.state().camera};
+  const std::optional<StartState> found = start_.find(now, recent, ingest_);
+  if (!found) return;
+  const Advice advice = advise(consistency_, health_.health(), config_.anomaly);
+  alignment_ = start_.begin(*found, last_good_, advice, ingest_, ekf_, sources_, records_);
+  sources_.advance(t_ns, advice, ingest_, ekf_, records_);
 }
 
-InputCounts Filter::input_counts() const {
-  InputCounts counts = guard_.counts();
-  counts.clock_jumps =
-      static_cast<std::uint64_t>(clocks_.imu.jumps_corrected() + clocks_.encoder.jumps() + clocks_.camera.jumps());
-  return counts;
+/// While lost, the state goes on, and is good again if the cameras come to agree with it. Where they do not, but agree
+/// with the inertial samples, it is the state that is wrong, and begins anew.
+void Filter::start_again(const FeatureFrame& frame) {
+  if (!health_.lost()) {
+    start_.forget_frames();
+    return;
+  }
+  const CameraState given = camera_state(calibration_);  // what was learned may be as wrong as the rest
+  const Start::Situation now{frame, imu_time(frame.t_ns, given), false, false, true, given};
+  const std::optional<StartState> found = start_.find_in_motion(now, ingest_, health_.contradicted());
+  if (!found) return;
+  stop();
+  const Advice advice = advise(consistency_, health_.health(), config_.anomaly);
+  alignment_ = start_.begin(*found, last_good_, advice, ingest_, ekf_, sources_, records_);
+  sources_.advance(imu_time(frame.t_ns, ekf_.state().camera), advice, ingest_, ekf_, records_);
+}
+
+/// Nothing of the state is used any more.
+void Filter::stop() {
+  without_state_ = Status::lost;
+  ekf_.reset();
+  sources_.reset();
+  ingest_.drop_readings();
+  ingest_.interruption() = ImuInterruption{};
+  bias_watch_ = BiasWatch{};
+}
+
+/// As after construction, but for the clocks, and where the vehicle was last known to be.
+void Filter::restart(TimeNs t_ns, TimeNs clock_shift) {
+  Filter fresh(config_, calibration_);
+  ingest_.restart();
+  fresh.ingest_ = std::move(ingest_);
+  fresh.health_.succeed(health_, t_ns);
+  fresh.alignment_ = alignment_;
+  fresh.last_good_ = std::move(last_good_);
+  if (fresh.last_good_) fresh.last_good_->state.t_ns += clock_shift;
+  if (ekf_.running() || without_state_ == Status::lost) fresh.without_state_ = Status::lost;
+  *this = std::move(fresh);
+}
+
+// ---- Samples in
+
+void Filter::add_imu(const ImuSample& sample) {
+  ingest_.imu_clock().add(sample);
+  take_imu();
+}
+
+void Filter::take_imu() {
+  while (const std::optional<ImuSample> sample = ingest_.imu_clock().next()) {
+    const ImuVerdict verdict = ingest_.judge(*sample);
+    if (!verdict.accepted) {
+      health_.add_refused_imu();
+      continue;
+    }
+    if (verdict.begins_anew) restart(sample->t_ns, verdict.clock_shift);
+    health_.add_imu(*sample, config_.max_imu_gap);
+    // Without frames for long, the state moves on before its samples are overwritten.
+    const std::optional<TimeNs> due_ns = ingest_.imu_due();
+    if (due_ns && ekf_.running()) sources_.propagate(*due_ns, Advice{}, ingest_, ekf_);
+    const ImuSpike spike = ingest_.store(*sample);
+    health_.report_imu_fault(spike.gyro, spike.accel, sample->t_ns);
+    sources_.watch_contact(*sample, ekf_);
+  }
+  if (ingest_.imu_clock().take_correction()) health_.report_imu_fault(true, true, ingest_.imu().newest().t_ns);
+}
+
+void Filter::add_encoder(const EncoderSample& sample) {
+  if (!sources_.uses_wheels()) return;
+  ingest_.imu_clock().observe(ImuClock::Stream::encoder, sample.t_ns);
+  take_imu();
+  const Ingest::Encoders taken = ingest_.take(sample, ekf_.time());
+  if (!ingest_.imu().empty()) health_.add_encoder(taken.sample, taken.verdict, ingest_.imu().newest().t_ns);
+  if (taken.verdict != Verdict::accepted) return;
+  sources_.watch_contact(taken.sample, ekf_);
+  if (!taken.increment) return;
+  sources_.standstill().add(*taken.increment);
+  if (const auto due_ns = ingest_.due_before(*taken.increment, ekf_.running())) {
+    sources_.advance(*due_ns, Advice{}, ingest_, ekf_, records_);
+  }
+  ingest_.push(*taken.increment);
+}
+
+void Filter::add_laser(const LaserSample& sample) {
+  if (!sources_.uses_wheels() || !calibration_.lasers || calibration_.lasers->beams.empty()) return;
+  ingest_.imu_clock().observe(ImuClock::Stream::laser, sample.t_ns);
+  take_imu();
+  const Verdict verdict = ingest_.judge(sample, ekf_.time());
+  if (!ingest_.imu().empty()) {
+    health_.add_laser(sample, verdict, *calibration_.lasers, ingest_.imu().newest().t_ns);
+  }
+  if (verdict != Verdict::accepted) return;
+  sources_.watch_contact(sample, ekf_);
+  if (const auto due_ns = ingest_.due_before(sample, ekf_.running())) {
+    sources_.advance(*due_ns, Advice{}, ingest_, ekf_, records_);
+  }
+  ingest_.push(sample);
+}
+
+std::optional<TimeNs> Filter::common_stamp(TimeNs camera_stamp_ns) {
+  ingest_.imu_clock().observe(ImuClock::Stream::camera, camera_stamp_ns);
+  take_imu();
+  if (!is_time(camera_stamp_ns)) return camera_stamp_ns;
+  const std::optional<TimeNs> stamp = ingest_.camera_stamp(camera_stamp_ns);
+  if (!stamp) health_.report_camera_fault(ingest_.imu().newest().t_ns);
+  return stamp;
 }
 
 void Filter::refuse_frame() {
-  if (!imu_.empty()) monitor_.add_refused_frame(imu_.newest().t_ns);
+  if (!ingest_.imu().empty()) health_.add_refused_frame(ingest_.imu().newest().t_ns);
 }
 
-/// May the state be given away?
-bool Filter::usable() const {
-  const HealthStatus status = monitor_.health().status;
-  return status_ == Status::tracking && (status == HealthStatus::tracking || status == HealthStatus::degraded);
+// ---- Questions
+
+FrameStamp Filter::check_stamp(TimeNs t_ns) const {
+  if (last_frame_ns_ && t_ns <= *last_frame_ns_) return FrameStamp::not_later;
+  const bool covered = is_time(t_ns) && ingest_.covers(imu_time(t_ns, ekf_.state().camera));
+  return covered ? FrameStamp::usable : FrameStamp::no_samples;
 }
 
-Status Filter::status() const { return status_ == Status::tracking && monitor_.lost() ? Status::lost : status_; }
+TimeNs Filter::camera_time(TimeNs imu_time_ns) const { return ear::camera_time(imu_time_ns, ekf_.state().camera); }
 
-std::optional<Estimate> Filter::process_without_image(TimeNs t_ns) {
-  if (!covers(t_ns) || !is_next(t_ns)) return std::nullopt;
-  if (status_ == Status::tracking && !calibration_.cameras.empty() && !on_ground()) return std::nullopt;
-  FeatureFrame nothing;
-  nothing.t_ns = t_ns;
-  const bool still = begin_frame(nothing, false);
-  if (status_ == Status::tracking) go_on_blind(still);
-  return finish_frame(false, FrameAgreement{});
+Status Filter::status() const {
+  if (!ekf_.running()) return without_state_;
+  return health_.lost() ? Status::lost : Status::tracking;
 }
 
-/// What comes before anything is done with the features: start if possible, propagate. Does the vehicle stand?
-bool Filter::begin_frame(const FeatureFrame& frame, bool frozen) {
-  any_frame_ = true;
-  last_frame_ns_ = frame.t_ns;
-  right_skipped_ = frame.right_skipped;
-  statistics_ = FrameStatistics{};
-  feature_noise_ = noise_of(frame);
-  consistency_ = Consistency{};
-  log_.start_frame();
-  statistics_.tracks = static_cast<int>(frame.features.size());
-  statistics_.stereo = static_cast<int>(std::count_if(frame.features.begin(), frame.features.end(),
-                                                      [](const FeatureObservation& f) { return f.has_right; }));
-
-  const TimeNs t_ns = imu_time(frame.t_ns);
-  const bool started = status_ == Status::tracking;
-  const ImuStatistics imu = imu_.statistics(t_ns - static_cast<TimeNs>(1e9 * config_.standstill.duration), t_ns);
-  const FeatureFrame nothing{frame.t_ns, {}};
-  const bool still =
-      standstill_.update(frozen ? nothing : frame, imu, started ? state_.imu.b_g : Eigen::Vector3d::Zero(),
-                         started ? config_.standstill.max_gyro : config_.standstill.max_gyro_at_start,
-                         on_ground() ? wheel_rest_.duration(t_ns, kWheelAge) : std::nullopt);
-  contact_.set_gyro_bias(state_.imu.b_g);
-  statistics_.on_ground = on_ground();
-  if (started) {
-    compare_sensors(frame, t_ns);
-    advance_measuring(t_ns);
-    start_again(frame);
-  } else if (try_start(t_ns, imu, still) || try_rolling_start() || try_moving_start(frame)) {
-    moving_start_.clear();
-    advance_measuring(t_ns);
+std::optional<RelativeMotion> Filter::motion_to(TimeNs t_ns) const {
+  const std::optional<LastImage>& last = sources_.cameras().last_image();
+  if (!is_time(t_ns) || !last || ingest_.imu().empty() || t_ns <= last->t_ns) return std::nullopt;
+  const CameraState& camera = ekf_.state().camera;
+  const TimeNs to_ns = imu_time(t_ns, camera);
+  if (ekf_.running()) {
+    return motion_between(last->T_WB, nav_state(integrate_to(to_ns, ekf_.state().imu, ingest_.imu())));
   }
-  return still;
-}
-
-/// Before anything of the interval up to t_ns is used: how far the body goes in it, told by each sensor alone.
-void Filter::compare_sensors(const FeatureFrame& frame, TimeNs t_ns) {
-  const ImuMotion motion = imu_motion(state_.imu, imu_, t_ns, calibration_.imu);
-  Displacements displacements;
-  displacements[index_of(MotionSensor::imu)] = imu_displacement(motion, covariance_);
-  displacements[index_of(MotionSensor::odometer)] = displacement_by_wheels(t_ns);
-  if (state_.imu.t_ns != compared_ns_) camera_displacement_.clear();  // the frame before was not where the state is
-  const double bias =
-      motion.duration * motion.duration * covariance_.matrix().diagonal().segment<3>(err::b_g).maxCoeff();
-  displacements[index_of(MotionSensor::camera)] =
-      camera_displacement_.add(frame, state_.camera, motion.R_BiBj, motion.rotation_variance + bias);
-  compared_ns_ = t_ns;
-  consistency_ = consistency_check_(displacements);
-}
-
-/// Factor on the inverse standard deviation of what the sensor says about the interval at hand.
-double Filter::trust(MotionSensor sensor) const {
-  if (!config_.anomaly.enabled || consistency_.anomalous != sensor) return 1.0;
-  return std::max(consistency_.weight[index_of(sensor)], config_.anomaly.min_weight);
+  RelativeMotion motion;
+  if (const std::optional<Eigen::Vector3d> path = start_.path_to(to_ns)) {
+    motion.p_B0B1 = *path;
+    motion.translation_known = true;
+  }
+  const TimeNs from_ns = imu_time(last->t_ns, camera);
+  motion.R_B1B0 = gyro_rotation(from_ns, to_ns, Eigen::Vector3d::Zero(), ingest_.imu()).transpose();
+  return motion;
 }
 
 std::optional<NavState> Filter::predict(TimeNs t_ns) const {
-  if (!usable() || !is_time(t_ns) || seconds_between(imu_.newest().t_ns, t_ns) > kLongestPredict) return std::nullopt;
-  return anchor_.to_world(predict_here(t_ns));
-}
-
-/// From the invariant error to the ordinary one: dv = nu - [v]x theta, dp = rho - [p]x theta. Where the scale is given,
-/// with what it may be off: larger wheels make way and velocity longer alike.
-ImuErrorMatrix Filter::ordinary_covariance() const {
-  const ImuState& x = state_.imu;
-  ImuErrorMatrix T = ImuErrorMatrix::Identity();
-  T.block<3, 3>(estimate_error::velocity, err::theta) = -skew(x.v_W);
-  T.block<3, 3>(estimate_error::position, err::theta) = -skew(x.p_WB);
-  ImuErrorMatrix P = T * covariance_.matrix().topLeftCorner<err::imu_size, err::imu_size>() * T.transpose();
-  if (!scale_is_given()) return P;
-  Eigen::Matrix<double, err::imu_size, 1> J = Eigen::Matrix<double, err::imu_size, 1>::Zero();
-  J.segment<3>(estimate_error::velocity) = x.v_W;
-  J.segment<3>(estimate_error::position) = x.p_WB;
-  return P + config_.prior.wheel_scale * config_.prior.wheel_scale * J * J.transpose();
-}
-
-Estimate Filter::make_estimate() const {
-  const ImuState& x = state_.imu;
-  Estimate estimate;
-  const NavState here = predict_here(x.t_ns);
-  estimate.state = anchor_.to_world(here);
-  estimate.covariance = anchor_.to_world(ordinary_covariance(), here);
-  estimate.frame = statistics_;
-  estimate.consistency = consistency_;
-  if (ground_known_) {
-    const Slope ground = slope(x.R_WB * state_.odometer.T_BO.R.col(1), state_.ground.n_W);
-    const std::array<int, 5> entries = {err::theta, err::theta + 1, err::theta + 2, err::normal, err::normal + 1};
-    const Eigen::Matrix<double, 5, 5> P = covariance_.matrix()(entries, entries);
-    const Eigen::Matrix2d P_slope = ground.J * P * ground.J.transpose();
-    estimate.terrain = {true, ground.along, ground.across, std::sqrt(P_slope(0, 0)), std::sqrt(P_slope(1, 1))};
-  }
-  return estimate;
+  if (!ekf_.running() || !health_.usable() || !is_time(t_ns)) return std::nullopt;
+  if (seconds_between(ingest_.imu().newest().t_ns, t_ns) > kLongestPredict) return std::nullopt;
+  return alignment_.to_world(nav_state(integrate_to(t_ns, ekf_.state().imu, ingest_.imu())));
 }
 
 }  // namespace ear

@@ -14,7 +14,7 @@
 #include <Eigen/Geometry>
 #include <array>
 
-#include "filter/state.h"
+#include "filter/ekf/state.h"
 
 namespace ear::smoother {
 

@@ -1,6 +1,6 @@
 #include "smoother/feature_factor.h"
 
-#include "filter/feature_update.h"
+#include "filter/sources/cameras/feature_update.h"
 #include "smoother/factor.h"
 
 namespace ear::smoother {

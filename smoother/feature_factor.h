@@ -3,7 +3,7 @@
 
 #include <ceres/sized_cost_function.h>
 
-#include "filter/triangulation.h"
+#include "filter/sources/cameras/triangulation.h"
 #include "smoother/blocks.h"
 
 namespace ear::smoother {

@@ -3,7 +3,7 @@
 #include <Eigen/LU>
 #include <cmath>
 
-#include "filter/ground.h"
+#include "filter/sources/ground/ground_rows.h"
 
 namespace ear::smoother {
 
@@ -38,7 +38,7 @@ bool GroundNormal::add(const std::array<double, kMaxBeams>& range, const Odomete
   Eigen::Vector2d b = Eigen::Vector2d::Zero();
   const auto take = [&](double residual, const Eigen::RowVector2d& h, double sigma) {
     const double variance = (h * P_ * h.transpose()).value() + sigma * sigma;
-    if (!(residual * residual <= gate_(1) * variance)) return false;
+    if (!gate_.fits(residual, variance)) return false;
     A += h.transpose() * h / (sigma * sigma);
     b += h.transpose() * residual / (sigma * sigma);
     return true;

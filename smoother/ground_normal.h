@@ -7,8 +7,8 @@
 
 #include "ear/calibration.h"
 #include "ear/filter_config.h"
-#include "filter/chi_squared.h"
-#include "filter/state.h"
+#include "filter/ekf/gate.h"
+#include "filter/ekf/state.h"
 
 namespace ear::smoother {
 
@@ -39,7 +39,7 @@ class GroundNormal {
  private:
   OdometerConfig config_;
   LaserCalibration lasers_;
-  ChiSquaredGate gate_;
+  Gate gate_;
   bool known_ = false;
   Eigen::Vector3d n_B_ = Eigen::Vector3d::UnitZ();
   Eigen::Matrix2d P_ = Eigen::Matrix2d::Identity();

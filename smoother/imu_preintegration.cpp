@@ -1,6 +1,6 @@
 #include "smoother/imu_preintegration.h"
 
-#include "filter/so3.h"
+#include "filter/ekf/so3.h"
 
 namespace ear::smoother {
 namespace {

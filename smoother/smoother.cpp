@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "filter/initial_state.h"
+#include "filter/ekf/initial_state.h"
 
 namespace ear::smoother {
 namespace {
@@ -172,7 +172,7 @@ void Smoother::go_on_from(const Estimate& last) {
   const NavState here = predict_here(window_->newest().t_ns);
   const double way = seconds_between(last.state.t_ns, here.t_ns) * (last.state.v_W.norm() + kUnseenSpeed);
   const double variance = last.covariance.diagonal().segment<3>(estimate_error::position).maxCoeff();
-  anchor_ = Anchor::join(last.state, here, M_PI, std::sqrt(std::max(variance, 0.0) + way * way));
+  alignment_ = MapAlignment::join(last.state, here, M_PI, std::sqrt(std::max(variance, 0.0) + way * way));
   ++health_.reset_counter;
 }
 

@@ -11,20 +11,20 @@
 
 #include "ear/calibration.h"
 #include "ear/filter_config.h"
-#include "filter/anchor.h"
-#include "filter/camera_displacement.h"
-#include "filter/chi_squared.h"
-#include "filter/consistency.h"
-#include "filter/contact.h"
-#include "filter/covariance.h"
+#include "filter/ekf/covariance.h"
+#include "filter/ekf/gate.h"
 #include "filter/estimator.h"
 #include "filter/filter.h"
-#include "filter/impact_guard.h"
-#include "filter/imu_buffer.h"
-#include "filter/input_guard.h"
-#include "filter/ring.h"
-#include "filter/standstill.h"
-#include "filter/wheels.h"
+#include "filter/health/consistency.h"
+#include "filter/ingest/impact_guard.h"
+#include "filter/ingest/imu_buffer.h"
+#include "filter/ingest/input_guard.h"
+#include "filter/ingest/ring.h"
+#include "filter/sources/cameras/camera_displacement.h"
+#include "filter/sources/ground/contact.h"
+#include "filter/sources/standstill/standstill_detector.h"
+#include "filter/sources/wheels/wheel_rows.h"
+#include "filter/start/map_alignment.h"
 #include "smoother/ground_normal.h"
 #include "smoother/window.h"
 
@@ -99,7 +99,7 @@ class Smoother final : public Estimator {
   FilterConfig config_;
   Calibration calibration_;
   double focal_px_;
-  ChiSquaredGate gate_;
+  Gate gate_;
   InputGuard guard_;
   ImpactGuard impact_guard_;
   ImuBuffer imu_;
@@ -131,7 +131,7 @@ class Smoother final : public Estimator {
   TimeNs last_image_ns_ = 0;
   FrameStatistics statistics_;
   Health health_;
-  Anchor anchor_;  ///< of the window's world in that of the estimates
+  MapAlignment alignment_;  ///< of the window's world in that of the estimates
   std::optional<Estimate> last_good_;
 };
 

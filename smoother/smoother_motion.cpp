@@ -2,10 +2,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "filter/displacement_update.h"
-#include "filter/displacements.h"
-#include "filter/propagation.h"
-#include "filter/wheel_agreement.h"
+#include "filter/ekf/propagation.h"
+#include "filter/sources/wheels/displacement_update.h"
+#include "filter/sources/wheels/wheel_agreement.h"
+#include "filter/sources/wheels/wheel_displacement.h"
 #include "smoother/smoother.h"
 
 namespace ear::smoother {
@@ -48,9 +48,9 @@ void Smoother::tell_covariance(const ImuState& x) {
   T.block<3, 3>(err::nu, err::theta) = skew(x.v_W);
   T.block<3, 3>(err::rho, err::theta) = skew(x.p_WB);
   P_.reset(Eigen::VectorXd::Zero(err::clones));
-  P_.widen(err::theta, T * covariance_->state * T.transpose());
-  P_.widen(err::normal, normal_.covariance());
-  P_.widen(err::wheel_radius, covariance_->wheels);
+  P_.inflate(err::theta, T * covariance_->state * T.transpose());
+  P_.inflate(err::normal, normal_.covariance());
+  P_.inflate(err::wheel_radius, covariance_->wheels);
 }
 
 double Smoother::trust(MotionSensor sensor) const {
@@ -159,7 +159,7 @@ bool Smoother::add_wheel_noise(WheelDisplacement& z, TimeNs t_ns) {
     const Eigen::Vector3d& u = directions[i];
     const double d = u.dot(inertial.p_BiBj - wheels.p_BiBj);
     const double variance = u.dot((inertial.covariance + wheels.covariance) * u);
-    if (agrees_again(agrees_since_ns_[i], d * d <= gate_(1) * variance, t_ns)) {
+    if (agrees_again(agrees_since_ns_[i], gate_.fits(d, variance), t_ns)) {
       ++left;
     } else {
       covariance += kRefused * kRefused * u * u.transpose();

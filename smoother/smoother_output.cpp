@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "filter/ground.h"
+#include "filter/sources/ground/ground_rows.h"
 #include "smoother/smoother.h"
 
 namespace ear::smoother {
@@ -27,7 +27,7 @@ NavState Smoother::predict_here(TimeNs t_ns) const { return nav_state(integrate_
 
 std::optional<NavState> Smoother::predict(TimeNs t_ns) const {
   if (!window_ || !is_time(t_ns) || seconds_between(imu_.newest().t_ns, t_ns) > kLongestPredict) return std::nullopt;
-  return anchor_.to_world(predict_here(t_ns));
+  return alignment_.to_world(predict_here(t_ns));
 }
 
 std::optional<RelativeMotion> Smoother::motion_to(TimeNs t_ns) const {
@@ -39,8 +39,8 @@ std::optional<RelativeMotion> Smoother::motion_to(TimeNs t_ns) const {
 Estimate Smoother::make_estimate() const {
   const NavState here = predict_here(window_->newest().t_ns);
   Estimate estimate;
-  estimate.state = anchor_.to_world(here);
-  estimate.covariance = anchor_.to_world(covariance_->state, here);
+  estimate.state = alignment_.to_world(here);
+  estimate.covariance = alignment_.to_world(covariance_->state, here);
   estimate.frame = statistics_;
   estimate.consistency = consistency_;
   if (on_ground() && normal_.known()) estimate.terrain = terrain();

@@ -1,6 +1,6 @@
 #include "smoother/wheel_chain.h"
 
-#include "filter/so3.h"
+#include "filter/ekf/so3.h"
 
 namespace ear::smoother {
 

@@ -4,7 +4,7 @@
 
 #include <ceres/sized_cost_function.h>
 
-#include "filter/wheel_preintegration.h"
+#include "filter/sources/wheels/wheel_preintegration.h"
 #include "smoother/blocks.h"
 
 namespace ear::smoother {

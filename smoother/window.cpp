@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "filter/parallax.h"
+#include "filter/sources/cameras/parallax.h"
 #include "smoother/wheel_factor.h"
 
 namespace ear::smoother {

@@ -15,11 +15,11 @@
 
 #include "ear/calibration.h"
 #include "ear/filter_config.h"
-#include "filter/chi_squared.h"
-#include "filter/state.h"
-#include "filter/tracks.h"
-#include "filter/triangulation.h"
-#include "filter/wheel_preintegration.h"
+#include "filter/ekf/gate.h"
+#include "filter/ekf/state.h"
+#include "filter/sources/cameras/tracks.h"
+#include "filter/sources/cameras/triangulation.h"
+#include "filter/sources/wheels/wheel_preintegration.h"
 #include "smoother/blocks.h"
 #include "smoother/factor.h"
 #include "smoother/imu_preintegration.h"
@@ -139,7 +139,7 @@ class Window {
   FilterConfig config_;
   double focal_px_;
   double sigma_;  ///< of an observation, normalized
-  ChiSquaredGate gate_;
+  Gate gate_;
   mutable PoseManifold pose_manifold_;
   mutable ceres::HuberLoss huber_;
   std::vector<std::unique_ptr<Frame>> frames_;  ///< oldest first; blocks do not move

@@ -123,7 +123,7 @@ bool Window::fits(const PointTerm& term) const {
     sum += rho[1] * r.squaredNorm();
   }
   const int freedom = 2 * static_cast<int>(term.factors.size()) - 3;
-  return sum <= gate_(freedom) && (*term.block)[2] > 0.0;
+  return gate_.fits_distance(sum, freedom) && (*term.block)[2] > 0.0;
 }
 
 /// Features that do not fit are used no more.

@@ -1,7 +1,7 @@
 #include "src/live_state.h"
 
-#include "filter/propagation.h"
-#include "filter/stamp_guard.h"
+#include "filter/ekf/propagation.h"
+#include "filter/ingest/stamp_guard.h"
 
 namespace ear {
 

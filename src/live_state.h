@@ -5,8 +5,8 @@
 #include <optional>
 
 #include "ear/estimate.h"
-#include "filter/ring.h"
-#include "filter/state.h"
+#include "filter/ekf/state.h"
+#include "filter/ingest/ring.h"
 #include "src/latest_value.h"
 
 namespace ear {

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "filter/filter.h"
-#include "filter/stamp_guard.h"
+#include "filter/ingest/stamp_guard.h"
 #include "frontend/frontend.h"
 #include "src/load_governor.h"
 #include "src/odometry_factory.h"
@@ -62,7 +62,9 @@ class Odometry::Impl {
     StereoFrame frame = given;
     frame.t_ns = *stamp_ns;
     if (!accepts(frame.t_ns, camera_)) {
-      if (is_time(frame.t_ns) && estimator_->is_next(frame.t_ns)) estimator_->refuse_frame();
+      if (is_time(frame.t_ns) && estimator_->check_stamp(frame.t_ns) == FrameStamp::no_samples) {
+        estimator_->refuse_frame();
+      }
       return std::nullopt;
     }
     if (!takes_turn()) {
@@ -104,7 +106,7 @@ class Odometry::Impl {
 
   [[nodiscard]] Calibration calibration() const {
     Calibration learned = calibration_;
-    const CameraState camera = estimator_->cameras();
+    const auto [camera, odometer] = estimator_->calibration();
     const auto isometry = [](const Pose& T) {
       Eigen::Isometry3d result = Eigen::Isometry3d::Identity();
       result.linear() = T.R;
@@ -114,7 +116,6 @@ class Odometry::Impl {
     if (!learned.cameras.empty()) learned.cameras.front().T_BC = isometry(camera.T_BC0);
     if (learned.cameras.size() == 2) learned.cameras[1].T_BC = isometry(camera.T_BC0) * isometry(camera.T_C0C1);
     learned.camera_time_offset = camera.time_offset;
-    const OdometerState odometer = estimator_->odometer();
     if (learned.encoder) {
       learned.encoder->wheel_radius = {odometer.wheel_radius(0), odometer.wheel_radius(1)};
       learned.encoder->track_width = odometer.track_width;
@@ -140,12 +141,17 @@ class Odometry::Impl {
   bool accepts(TimeNs t_ns, StreamCounts& counts) const {
     if (!is_time(t_ns)) {
       ++counts.implausible;
-    } else if (!estimator_->is_next(t_ns)) {
-      ++counts.not_later;
-    } else if (!estimator_->covers(t_ns)) {
-      ++counts.far_ahead;
-    } else {
-      return true;
+      return false;
+    }
+    switch (estimator_->check_stamp(t_ns)) {
+      case FrameStamp::usable:
+        return true;
+      case FrameStamp::not_later:
+        ++counts.not_later;
+        break;
+      case FrameStamp::no_samples:
+        ++counts.far_ahead;
+        break;
     }
     return false;
   }

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "filter/so3.h"
+#include "filter/ekf/so3.h"
 
 namespace ear::mavlink {
 namespace {

@@ -1,4 +1,4 @@
-#include "filter/bias_watch.h"
+#include "filter/health/bias_watch.h"
 
 #include <doctest/doctest.h>
 

@@ -1,4 +1,4 @@
-#include "filter/camera_displacement.h"
+#include "filter/sources/cameras/camera_displacement.h"
 
 #include <doctest/doctest.h>
 

@@ -6,8 +6,8 @@
 #include <functional>
 #include <vector>
 
-#include "filter/imu_clock.h"
-#include "filter/stream_clock.h"
+#include "filter/ingest/imu_clock.h"
+#include "filter/ingest/stream_clock.h"
 
 using namespace ear;
 
@@ -47,12 +47,12 @@ std::vector<Out> run(const Driver& imu, const Driver& wheels, const Driver& came
       fetch();
     }
     if (with_wheels && t % (10 * kMs) == kMs && wheels(t - kMs) >= 0) {
-      clock.hear(ImuClock::Stream::encoder, wheels(t - kMs));
+      clock.observe(ImuClock::Stream::encoder, wheels(t - kMs));
       fetch();
     }
     const TimeNs exposed = t - 12 * kMs;
     if (exposed >= 0 && exposed % (33 * kMs) == 0 && camera(exposed) >= 0) {
-      clock.hear(ImuClock::Stream::camera, camera(exposed));
+      clock.observe(ImuClock::Stream::camera, camera(exposed));
       fetch();
     }
   }
@@ -114,25 +114,25 @@ TEST_CASE("imu clock: a verdict that later readings contradict is undone") {
     clock.add(sample);
     while (const auto s = clock.next()) newest = s->t_ns;
   };
-  const auto hear = [&](TimeNs t) {
-    clock.hear(ImuClock::Stream::encoder, t);
+  const auto observe = [&](TimeNs t) {
+    clock.observe(ImuClock::Stream::encoder, t);
     while (const auto s = clock.next()) newest = s->t_ns;
   };
   TimeNs t = 0;
   for (; t < kJumpAt; t += 5 * kMs) {
     add(t);
-    if (t % (10 * kMs) == 0) hear(t);
+    if (t % (10 * kMs) == 0) observe(t);
   }
   // All stood still for 0.3 s: the inertial samples are lost, the wheels' were queued and come all at once.
   const TimeNs resumed = t + 300 * kMs;
   for (TimeNs late = 0; late < 4; ++late) {
     add(resumed + 5 * kMs * late);
-    hear(t + 10 * kMs * late);
+    observe(t + 10 * kMs * late);
   }
-  for (TimeNs queued = t + 40 * kMs; queued < resumed; queued += 10 * kMs) hear(queued);
+  for (TimeNs queued = t + 40 * kMs; queued < resumed; queued += 10 * kMs) observe(queued);
   for (TimeNs now = resumed + 20 * kMs; now < resumed + 500 * kMs; now += 5 * kMs) {
     add(now);
-    hear(now);
+    observe(now);
     if (now > resumed + 200 * kMs) CHECK(newest == now);
   }
 }

@@ -1,4 +1,4 @@
-#include "filter/consistency.h"
+#include "filter/health/consistency.h"
 
 #include <doctest/doctest.h>
 

@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "filter/contact.h"
+#include "filter/sources/ground/contact.h"
 #include "tests/support/flat_ground.h"
 
 using namespace ear;

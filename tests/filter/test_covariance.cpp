@@ -4,7 +4,7 @@
 #include <Eigen/LU>
 #include <random>
 
-#include "filter/covariance.h"
+#include "filter/ekf/covariance.h"
 #include "tests/support/random_state.h"
 
 using namespace ear;
@@ -141,7 +141,7 @@ TEST_CASE("covariance: what is widened keeps its correlations") {
   const Eigen::MatrixXd before = P.matrix();
   Eigen::Matrix3d Q;
   Q << 0.01, 0.002, 0.0, 0.002, 0.04, -0.01, 0.0, -0.01, 0.09;
-  P.widen(err::nu, Q);
+  P.inflate(err::nu, Q);
   Eigen::MatrixXd added = P.matrix() - before;
   CHECK((added.block<3, 3>(err::nu, err::nu) - Q).norm() < 1e-12);
   added.block<3, 3>(err::nu, err::nu).setZero();

@@ -1,4 +1,4 @@
-#include "filter/displacements.h"
+#include "filter/sources/wheels/wheel_displacement.h"
 
 #include <doctest/doctest.h>
 
@@ -6,8 +6,8 @@
 #include <cmath>
 #include <random>
 
-#include "filter/displacement_update.h"
-#include "filter/propagation.h"
+#include "filter/ekf/propagation.h"
+#include "filter/sources/wheels/displacement_update.h"
 #include "tests/support/check_jacobian.h"
 #include "tests/support/random_state.h"
 

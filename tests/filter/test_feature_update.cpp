@@ -6,9 +6,9 @@
 #include <cmath>
 #include <random>
 
-#include "filter/chi_squared.h"
-#include "filter/covariance.h"
-#include "filter/feature_update.h"
+#include "filter/ekf/covariance.h"
+#include "filter/ekf/gate.h"
+#include "filter/sources/cameras/feature_update.h"
 #include "tests/support/check_jacobian.h"
 #include "tests/support/random_state.h"
 

@@ -1,4 +1,4 @@
-#include "filter/ground.h"
+#include "filter/sources/ground/ground_rows.h"
 
 #include <doctest/doctest.h>
 

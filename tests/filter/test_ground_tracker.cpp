@@ -3,7 +3,7 @@
 #include <functional>
 #include <limits>
 
-#include "filter/ground_tracker.h"
+#include "filter/sources/ground/ground_tracker.h"
 #include "tests/support/flat_ground.h"
 
 using namespace ear;

@@ -3,7 +3,7 @@
 
 #include <limits>
 
-#include "filter/health_monitor.h"
+#include "filter/health/health_monitor.h"
 
 using namespace ear;
 
@@ -67,15 +67,15 @@ struct Drive {
 }  // namespace
 
 TEST_CASE("trust: it takes a while to lose it, and longer to win it back") {
-  Trust trust;
+  FaultState trust;
   double t = 0.0;
   for (; t < 0.2; t += 0.05) trust.add(true, at(t));
-  CHECK(trust.trusted());
+  CHECK(trust.sound());
   for (; t < 0.4; t += 0.05) trust.add(true, at(t));
-  CHECK_FALSE(trust.trusted());
+  CHECK_FALSE(trust.sound());
   CHECK(trust.onset_ns() == at(0.0));
   const double end = t;
-  for (; trust.trusted() == false; t += 0.05) trust.add(false, at(t));
+  for (; trust.sound() == false; t += 0.05) trust.add(false, at(t));
   CHECK(t - end > 0.4);
   CHECK(t - end < 0.7);
 }
@@ -268,7 +268,7 @@ TEST_CASE("health: cameras that turn otherwise accuse the gyroscope, but not by 
     Drive drive;
     drive.frame.agreement.matches = 100;
     drive.frame.agreement.turn_sigma = 1e-4;
-    drive.frame.agreement.feigned_turn = feigned;
+    drive.frame.agreement.apparent_rate = feigned;
     drive.go_on(5.0);
     drive.frame.agreement.turn = Eigen::Vector3d(0.0, 0.0, 0.03 * 0.05);  // 0.03 rad/s
     drive.go_on(1.0);

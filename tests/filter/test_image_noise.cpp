@@ -3,8 +3,8 @@
 #include <cmath>
 #include <random>
 
-#include "filter/image_noise.h"
-#include "filter/so3.h"
+#include "filter/ekf/so3.h"
+#include "filter/sources/cameras/image_noise.h"
 
 using namespace ear;
 

@@ -5,7 +5,7 @@
 #include <random>
 #include <vector>
 
-#include "filter/impact_guard.h"
+#include "filter/ingest/impact_guard.h"
 
 using namespace ear;
 

@@ -1,4 +1,4 @@
-#include "filter/moving_start.h"
+#include "filter/start/moving_start.h"
 
 #include <doctest/doctest.h>
 

@@ -2,7 +2,7 @@
 
 #include <random>
 
-#include "filter/propagation.h"
+#include "filter/ekf/propagation.h"
 #include "tests/support/check_jacobian.h"
 #include "tests/support/random_state.h"
 

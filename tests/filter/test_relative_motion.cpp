@@ -1,10 +1,10 @@
-#include "filter/relative_motion.h"
+#include "filter/ekf/relative_motion.h"
 
 #include <doctest/doctest.h>
 
 #include <random>
 
-#include "filter/so3.h"
+#include "filter/ekf/so3.h"
 #include "tests/support/check_jacobian.h"
 #include "tests/support/random_state.h"
 

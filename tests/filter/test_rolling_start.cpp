@@ -1,4 +1,4 @@
-#include "filter/rolling_start.h"
+#include "filter/start/rolling_start.h"
 
 #include <doctest/doctest.h>
 

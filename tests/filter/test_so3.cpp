@@ -2,7 +2,7 @@
 
 #include <random>
 
-#include "filter/so3.h"
+#include "filter/ekf/so3.h"
 #include "tests/support/check_jacobian.h"
 #include "tests/support/random_state.h"
 

@@ -1,5 +1,5 @@
 // Which stamps are believed.
-#include "filter/stamp_guard.h"
+#include "filter/ingest/stamp_guard.h"
 
 #include <doctest/doctest.h>
 

@@ -1,6 +1,6 @@
 #include <doctest/doctest.h>
 
-#include "filter/state.h"
+#include "filter/ekf/state.h"
 #include "tests/support/random_state.h"
 
 using namespace ear;

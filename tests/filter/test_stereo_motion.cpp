@@ -3,9 +3,9 @@
 
 #include <random>
 
-#include "filter/frame_check.h"
-#include "filter/so3.h"
-#include "filter/stereo_motion.h"
+#include "filter/ekf/so3.h"
+#include "filter/sources/cameras/frame_check.h"
+#include "filter/sources/cameras/stereo_motion.h"
 
 using namespace ear;
 

@@ -6,8 +6,8 @@
 #include <optional>
 #include <random>
 
+#include "filter/ekf/so3.h"
 #include "filter/filter.h"
-#include "filter/so3.h"
 
 using namespace ear;
 
@@ -89,7 +89,7 @@ Outcome drive(const Car& car, std::uint64_t seed, const FilterConfig& config = {
   }
   REQUIRE(last);
   Outcome outcome;
-  outcome.radius = filter.state().odometer.wheel_radius.mean();
+  outcome.radius = filter.ekf().state().odometer.wheel_radius.mean();
   outcome.position = last->state.p_WB;
   // The world begins with the first sample: its origin there, its heading that of the body.
   const double heading = -car.weave(0.0) - car.mounting_yaw;

@@ -1,6 +1,6 @@
 #include <doctest/doctest.h>
 
-#include "filter/tracks.h"
+#include "filter/sources/cameras/tracks.h"
 
 using namespace ear;
 

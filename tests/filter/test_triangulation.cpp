@@ -2,7 +2,7 @@
 
 #include <random>
 
-#include "filter/triangulation.h"
+#include "filter/sources/cameras/triangulation.h"
 #include "tests/support/random_state.h"
 
 using namespace ear;

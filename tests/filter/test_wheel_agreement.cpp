@@ -1,4 +1,4 @@
-#include "filter/wheel_agreement.h"
+#include "filter/sources/wheels/wheel_agreement.h"
 
 #include <doctest/doctest.h>
 

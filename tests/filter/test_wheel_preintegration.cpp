@@ -5,8 +5,8 @@
 #include <random>
 #include <vector>
 
-#include "filter/so3.h"
-#include "filter/wheel_preintegration.h"
+#include "filter/ekf/so3.h"
+#include "filter/sources/wheels/wheel_preintegration.h"
 #include "tests/support/check_jacobian.h"
 #include "tests/support/random_drive.h"
 #include "tests/support/random_state.h"

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <random>
 
-#include "filter/wheel_watch.h"
+#include "filter/sources/ground/wheel_watch.h"
 
 using namespace ear;
 

@@ -1,4 +1,4 @@
-#include "filter/wheels.h"
+#include "filter/sources/wheels/wheel_rows.h"
 
 #include <doctest/doctest.h>
 

@@ -1,7 +1,7 @@
 // Contact and impacts on simulated sequences: three in short, and a guard that keeps still where nothing strikes.
 #include <doctest/doctest.h>
 
-#include "filter/impact_guard.h"
+#include "filter/ingest/impact_guard.h"
 #include "tests/support/contact_run.h"
 
 using namespace ear;

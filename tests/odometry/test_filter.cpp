@@ -112,16 +112,16 @@ TEST_CASE("filter: learns the calibration, and leaves it alone where it is froze
 
   Filter learning(FilterConfig{}, simulation.calibration());
   run_filter(learning, simulation);
-  CHECK(angle_to_truth(learning.state().camera.T_BC0.R) < 0.5 * angle_to_truth(T_told.linear()));
-  CHECK(std::abs(learning.state().camera.time_offset - offset_true) < 0.5e-3);
+  CHECK(angle_to_truth(learning.ekf().state().camera.T_BC0.R) < 0.5 * angle_to_truth(T_told.linear()));
+  CHECK(std::abs(learning.ekf().state().camera.time_offset - offset_true) < 0.5e-3);
 
   FilterConfig frozen_config;
   frozen_config.online_calibration.camera_extrinsics = false;
   frozen_config.online_calibration.time_offset = false;
   Filter frozen(frozen_config, simulation.calibration());
   run_filter(frozen, simulation);
-  CHECK((frozen.state().camera.T_BC0.R - T_told.linear()).norm() < 1e-9);
-  CHECK(frozen.state().camera.time_offset == simulation.calibration().camera_time_offset);
+  CHECK((frozen.ekf().state().camera.T_BC0.R - T_told.linear()).norm() < 1e-9);
+  CHECK(frozen.ekf().state().camera.time_offset == simulation.calibration().camera_time_offset);
 }
 
 TEST_CASE("filter: swaying in place it stays where it is, by camera and IMU alone") {
@@ -154,14 +154,14 @@ TEST_CASE("filter: turning on the spot does not push the translation out of the 
   const simulator::Simulation simulation = simulate("flat1", 12.0);
   Filter filter(FilterConfig{}, simulation.calibration());
   run_filter(filter, simulation);
-  const std::vector<Clone> before = filter.state().clones;
+  const std::vector<Clone> before = filter.ekf().state().clones;
   FeatureFrame frame = simulation.tracks(simulation.frame_times().size() - 1);
   ImuSample sample = simulation.imu().back();
   for (int i = 0; i < 40; ++i) {  // 1.3 s at 0.5 rad/s to the left
     for (int k = 0; k < 7; ++k) {
       sample.t_ns += 4'714'286;
-      sample.gyro_B = filter.state().imu.b_g + Eigen::Vector3d(0.0, 0.0, 0.5);
-      sample.accel_B = filter.state().imu.R_WB.transpose() * -kGravity_W + filter.state().imu.b_a;
+      sample.gyro_B = filter.ekf().state().imu.b_g + Eigen::Vector3d(0.0, 0.0, 0.5);
+      sample.accel_B = filter.ekf().state().imu.R_WB.transpose() * -kGravity_W + filter.ekf().state().imu.b_a;
       filter.add_imu(sample);
     }
     frame.t_ns += 33'000'000;
@@ -174,7 +174,7 @@ TEST_CASE("filter: turning on the spot does not push the translation out of the 
     REQUIRE(filter.process(frame));
   }
   const auto kept = [&](std::uint64_t number) {
-    for (const Clone& clone : filter.state().clones) {
+    for (const Clone& clone : filter.ekf().state().clones) {
       if (clone.frame == number) return true;
     }
     return false;
@@ -248,7 +248,7 @@ TEST_CASE("filter: wild observations do no harm") {
     REQUIRE(e.estimate.covariance.allFinite());
   }
   using Solver = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>;
-  CHECK(Solver(filter.covariance().matrix()).eigenvalues().minCoeff() > -1e-9);
+  CHECK(Solver(filter.ekf().covariance().matrix()).eigenvalues().minCoeff() > -1e-9);
 }
 
 TEST_CASE("filter: a gap in the inertial data is counted and survived") {

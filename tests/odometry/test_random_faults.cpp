@@ -218,7 +218,7 @@ TEST_CASE("random faults: nothing that comes in makes an estimate that cannot be
       REQUIRE(x.b_a.allFinite());
       REQUIRE(std::abs(x.q_WB.norm() - 1.0) < 1e-9);
       REQUIRE(positive(result->covariance));
-      REQUIRE(positive(filter.covariance().matrix()));
+      REQUIRE(positive(filter.ekf().covariance().matrix()));
       if (result->health.reset_counter == resets) REQUIRE(x.t_ns > last_ns);  // a restart may set the clock back
       resets = result->health.reset_counter;
       REQUIRE(std::isfinite(result->health.horizontal_sigma));

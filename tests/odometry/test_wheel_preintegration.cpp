@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "filter/imu_buffer.h"
-#include "filter/wheel_preintegration.h"
+#include "filter/ingest/imu_buffer.h"
+#include "filter/sources/wheels/wheel_preintegration.h"
 #include "tools/simulator/simulation.h"
 
 using namespace ear;

@@ -21,7 +21,6 @@ RUNS = [
     ("hop", ["--odometer", "none"]),
     ("kitti_a", []),
     ("micro_euroc", []),
-    ("euroc_v101_mono", []),
     ("euroc_mh01_mono", []),
     ("comma2k19", []),
     ("ucsd_20", []),

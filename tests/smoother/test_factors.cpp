@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "filter/displacement_update.h"
+#include "filter/sources/wheels/displacement_update.h"
 #include "smoother/feature_factor.h"
 #include "smoother/standstill_factor.h"
 #include "smoother/wheel_factor.h"

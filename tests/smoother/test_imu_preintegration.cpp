@@ -5,7 +5,7 @@
 #include <Eigen/Cholesky>
 #include <vector>
 
-#include "filter/propagation.h"
+#include "filter/ekf/propagation.h"
 #include "smoother/imu_factor.h"
 
 using namespace ear;

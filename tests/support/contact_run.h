@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "filter/contact.h"
+#include "filter/sources/ground/contact.h"
 #include "tools/simulator/simulation.h"
 
 namespace ear::test {

@@ -5,7 +5,7 @@
 #include <random>
 #include <vector>
 
-#include "filter/wheel_preintegration.h"
+#include "filter/sources/wheels/wheel_preintegration.h"
 #include "tests/support/random_state.h"
 
 namespace ear::test {

@@ -3,7 +3,7 @@
 
 #include <random>
 
-#include "filter/state.h"
+#include "filter/ekf/state.h"
 
 namespace ear::test {
 

@@ -18,7 +18,7 @@
 #include <string>
 #include <vector>
 
-#include "filter/state.h"
+#include "filter/ekf/state.h"
 #include "src/health_text.h"
 #include "src/recording/config_file.h"
 #include "tools/benchmarks/program.h"

@@ -35,7 +35,7 @@ void replay(const simulator::Simulation& simulation, Estimator& estimator, const
       if (const std::optional<TimeNs> stamp_ns = estimator.common_stamp(frame.t_ns)) {
         frame.t_ns = *stamp_ns;
         if (options.change) options.change(frame);
-        if (estimator.is_next(frame.t_ns) && estimator.covers(frame.t_ns)) steps.saw_frame(delivery.arrival_ns);
+        if (estimator.check_stamp(frame.t_ns) == FrameStamp::usable) steps.saw_frame(delivery.arrival_ns);
         timed([&] { result = estimator.process(frame); });
         report(frame.t_ns, result);
       }

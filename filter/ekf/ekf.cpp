@@ -1,0 +1,163 @@
+#include "filter/ekf/ekf.h"
+
+#include <cmath>
+
+#include "filter/ekf/initial_state.h"
+#include "filter/ekf/propagation.h"
+
+namespace ear {
+namespace {
+
+constexpr double kGapNoiseFactor = 10.0;  // chosen: on the noise densities while a gap in the IMU data is bridged
+constexpr double kKnownScale = 1e-6;      // of the wheels where nothing can measure it: zero, but regular
+constexpr double kUncertainTurn = 5e-3;   // [rad] chosen: standard deviation of one sample that images must confirm
+
+int error_capacity(const FilterConfig& config) { return err::clone(config.window + 1); }
+
+}  // namespace
+
+Ekf::Ekf(const FilterConfig& config, const Calibration& calibration)
+    : calibration_(calibration),
+      normal_prior_(config.odometer.normal_prior),
+      gate_(config.gate_probability, 4 * (config.window + 1)),
+      covariance_(error_capacity(config)) {
+  state_.clones.reserve(static_cast<std::size_t>(config.window) + 1);
+  reset();
+}
+
+void Ekf::start(const ImuState& x, const Eigen::VectorXd& sigma, bool scale_is_given) {
+  running_ = true;
+  state_.imu = x;
+  covariance_.reset(sigma);
+  if (!scale_is_given) return;
+  const Eigen::RowVector2d mean_is_known(0.5 / kKnownScale, 0.5 / kKnownScale);
+  covariance_.update(mean_is_known, err::wheel_radius, Eigen::Matrix<double, 1, 1>::Zero());
+}
+
+void Ekf::reset() {
+  running_ = false;
+  state_.imu = ImuState{};
+  state_.ground = GroundState{};
+  state_.camera = camera_state(calibration_);
+  state_.odometer = odometer_state(calibration_);
+  state_.clones.clear();
+  bias_changes_ = BiasChanges{};
+}
+
+std::optional<TimeNs> Ekf::propagate(const ImuBuffer& samples, TimeNs t_ns, const Propagation& how) {
+  std::optional<TimeNs> uncertain_ns;
+  if (t_ns <= state_.imu.t_ns) return uncertain_ns;
+  ErrorTransition total;
+  const double duration = seconds_between(state_.imu.t_ns, t_ns);
+  samples.for_each_piece(
+      state_.imu.t_ns, t_ns,
+      [&](const Eigen::Vector3d& gyro_B, const Eigen::Vector3d& accel_B, double dt, const ImuNoiseFactors& factors) {
+        ImuCalibration noise = calibration_.imu;
+        noise.gyro_noise *= factors.gyro;
+        noise.accel_noise *= factors.accel / how.weight;
+        if (noise.gyro_noise * std::sqrt(dt) > kUncertainTurn && !uncertain_ns) uncertain_ns = state_.imu.t_ns;
+        if (how.gap_from_ns && state_.imu.t_ns >= *how.gap_from_ns) {
+          noise.gyro_noise *= kGapNoiseFactor;
+          noise.accel_noise *= kGapNoiseFactor;
+        }
+        chain(total, error_transition(state_.imu, gyro_B, accel_B, dt, noise));
+        state_.imu = integrate(state_.imu, gyro_B, accel_B, dt);
+        rate_B_ = gyro_B - state_.imu.b_g;
+      });
+  state_.imu.t_ns = t_ns;
+  const double distance = state_.imu.v_W.norm() * duration;
+  covariance_.propagate(total, tangent_basis(state_.ground.n_W), how.normal_walk * how.normal_walk * distance);
+  return uncertain_ns;
+}
+
+void Ekf::apply(const Eigen::Ref<const Eigen::MatrixXd>& H, int first_column,
+                const Eigen::Ref<const Eigen::VectorXd>& r, CameraUpdate calibration, bool by_images) {
+  const int considered = calibration == CameraUpdate::learned ? 0 : err::calibration_size;
+  const auto variance = [this] { return covariance_.matrix().diagonal().segment<6>(err::b_g); };
+  const BiasChange::Vector6 before = variance();
+  const Eigen::Ref<const Eigen::VectorXd> correction = covariance_.update(H, first_column, r, err::camera, considered);
+  if (!correction.allFinite()) return;  // the covariance shows it: possible()
+  const BiasChange::Vector6 lowered = before - variance();
+  bias_changes_.all.add(correction.segment<6>(err::b_g), lowered);
+  if (by_images) bias_changes_.by_images.add(correction.segment<6>(err::b_g), lowered);
+  boxplus_in_place(state_, correction);
+}
+
+/// If the frame was taken a moment later than its stamp, the vehicle moved on: this is how the time offset is seen.
+void Ekf::clone(double feature_noise) {
+  const ImuState& x = state_.imu;
+  const Eigen::Vector3d rate_W = x.R_WB * rate_B_;
+  Eigen::Matrix<double, 6, err::imu_size> J_imu = Eigen::Matrix<double, 6, err::imu_size>::Zero();
+  J_imu.block<3, 3>(0, err::theta).setIdentity();
+  J_imu.block<3, 3>(3, err::rho).setIdentity();
+  Eigen::Matrix<double, 6, 1> J_offset;
+  J_offset << rate_W, x.v_W + x.p_WB.cross(rate_W);
+  covariance_.append_clone(J_imu, J_offset);
+  state_.clones.push_back({next_frame_++, {x.R_WB, x.p_WB}, feature_noise});
+}
+
+void Ekf::marginalise(std::size_t clone) {
+  covariance_.remove(err::clone(static_cast<int>(clone)), err::clone_size);
+  state_.clones.erase(state_.clones.begin() + static_cast<std::ptrdiff_t>(clone));
+}
+
+/// A rotation is about the body: by the invariant error, nu = dv + [v]x theta, rho = dp + [p]x theta.
+void Ekf::inflate_motion(double rotation, double velocity, double position) {
+  Eigen::Matrix<double, 9, 3> J;
+  J << Eigen::Matrix3d::Identity(), skew(state_.imu.v_W), skew(state_.imu.p_WB);
+  Eigen::Matrix<double, 9, 9> Q = rotation * rotation * J * J.transpose();
+  Q.diagonal().segment<3>(err::nu).array() += velocity * velocity;
+  Q.diagonal().segment<3>(err::rho).array() += position * position;
+  covariance_.inflate(err::theta, Q);
+}
+
+void Ekf::inflate_biases(double gyro, double accel) {
+  Eigen::Matrix<double, 6, 1> sigma;
+  sigma << Eigen::Vector3d::Constant(gyro), Eigen::Vector3d::Constant(accel);
+  covariance_.inflate(err::b_g, sigma.cwiseAbs2().asDiagonal().toDenseMatrix());
+}
+
+void Ekf::restart_normal(const Eigen::Vector3d& n_W) {
+  state_.ground.n_W = n_W;
+  const Eigen::Vector2d sigma = Eigen::Vector2d::Constant(normal_prior_);
+  covariance_.restart(err::normal, sigma);
+}
+
+BiasChanges Ekf::take_bias_changes() {
+  const BiasChanges changes = bias_changes_;
+  bias_changes_ = BiasChanges{};
+  return changes;
+}
+
+void Ekf::discard_bias_changes() {
+  bias_changes_ = BiasChanges{};
+  bias_changes_.restarted = true;
+}
+
+bool Ekf::possible() const {
+  const ImuState& x = state_.imu;
+  const OdometerState& o = state_.odometer;
+  const auto P = covariance_.matrix();
+  const bool finite = x.R_WB.allFinite() && x.p_WB.allFinite() && x.v_W.allFinite() && x.b_g.allFinite() &&
+                      x.b_a.allFinite() && state_.camera.T_BC0.R.allFinite() && state_.camera.T_BC0.p.allFinite() &&
+                      o.wheel_radius.allFinite() && std::isfinite(o.track_width) && o.T_BO.R.allFinite() &&
+                      state_.ground.n_W.allFinite() && std::isfinite(P.sum());  // one that is not makes the sum so
+  return finite && P.diagonal().minCoeff() >= 0.0;
+}
+
+/// From the invariant error to the ordinary one: dv = nu - [v]x theta, dp = rho - [p]x theta. Larger wheels make
+/// distance and velocity longer alike.
+ImuErrorMatrix Ekf::ordinary_covariance(double scale_sigma) const {
+  const ImuState& x = state_.imu;
+  ImuErrorMatrix T = ImuErrorMatrix::Identity();
+  T.block<3, 3>(estimate_error::velocity, err::theta) = -skew(x.v_W);
+  T.block<3, 3>(estimate_error::position, err::theta) = -skew(x.p_WB);
+  ImuErrorMatrix P = T * covariance_.matrix().topLeftCorner<err::imu_size, err::imu_size>() * T.transpose();
+  if (!(scale_sigma > 0.0)) return P;
+  Eigen::Matrix<double, err::imu_size, 1> J = Eigen::Matrix<double, err::imu_size, 1>::Zero();
+  J.segment<3>(estimate_error::velocity) = x.v_W;
+  J.segment<3>(estimate_error::position) = x.p_WB;
+  return P + scale_sigma * scale_sigma * J * J.transpose();
+}
+
+}  // namespace ear

@@ -1,0 +1,144 @@
+// The filter itself: a state, its covariance, and the five things that happen to them: propagate, apply, clone,
+// marginalise, inflate. It knows no sensor. docs/filter.md.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+
+#include "ear/calibration.h"
+#include "ear/filter_config.h"
+#include "filter/ekf/covariance.h"
+#include "filter/ekf/gate.h"
+#include "filter/ekf/records.h"
+#include "filter/ekf/state.h"
+#include "filter/ingest/imu_buffer.h"
+
+namespace ear {
+
+/// What an update does to the calibration of the cameras.
+enum class CameraUpdate : std::uint8_t {
+  learned,    ///< it is corrected as everything else
+  considered  ///< its uncertainty counts, its value stays (Schmidt-Kalman): this measurement shows nothing of it
+};
+
+/// Rows of wheels, lasers or the ground, linearised, not whitened: residual = H e + n, n independent, std(n) = sigma.
+/// Columns: ground_column().
+template <int kMax>
+struct GroundRows {
+  Eigen::Matrix<double, kMax, kGroundColumns> H = Eigen::Matrix<double, kMax, kGroundColumns>::Zero();
+  Eigen::Matrix<double, kMax, 1> residual = Eigen::Matrix<double, kMax, 1>::Zero();
+  Eigen::Matrix<double, kMax, 1> sigma = Eigen::Matrix<double, kMax, 1>::Ones();
+  int count = 0;
+};
+
+/// What updates did to the biases: the corrections, and by how much they lowered the variances. Gyroscope [rad/s], then
+/// accelerometer [m/s^2].
+struct BiasChange {
+  using Vector6 = Eigen::Matrix<double, 6, 1>;
+  Vector6 correction = Vector6::Zero();
+  Vector6 variance_lowered = Vector6::Zero();
+
+  void add(const Vector6& more_correction, const Vector6& more_lowered) {
+    correction += more_correction;
+    variance_lowered += more_lowered.cwiseMax(0.0);
+  }
+};
+struct BiasChanges {
+  BiasChange all, by_images;
+  bool restarted = false;  ///< what came before does not count
+};
+
+class Ekf {
+ public:
+  /// Usable settings and calibration: checked() in ekf/initial_state.h.
+  Ekf(const FilterConfig& config, const Calibration& calibration);
+
+  /// Begins at `x`, with these standard deviations of the whole error vector. `scale_is_given`: the mean of both wheel
+  /// radii is taken for known.
+  void start(const ImuState& x, const Eigen::VectorXd& sigma, bool scale_is_given = false);
+  /// Nothing of the state is used any more.
+  void reset();
+  /// Is there a state?
+  [[nodiscard]] bool running() const { return running_; }
+  [[nodiscard]] std::optional<TimeNs> time() const { return running_ ? std::optional(state_.imu.t_ns) : std::nullopt; }
+
+  /// How the samples on the way are to be taken.
+  struct Propagation {
+    double weight = 1.0;                ///< (15): the noise of the accelerometer is divided by it
+    std::optional<TimeNs> gap_from_ns;  ///< from there on samples are missing
+    double normal_walk = 0.0;           ///< how the ground's normal turns [rad/sqrt(m)]
+  };
+  /// To `t_ns`, by the samples. The time of the first one, if any, that may be off by more than noise (clipped).
+  std::optional<TimeNs> propagate(const ImuBuffer& samples, TimeNs t_ns, const Propagation& how);
+
+  /// The gate: one row of ground columns against what the state and its own noise allow.
+  template <typename Row>
+  [[nodiscard]] Innovation test(const Eigen::MatrixBase<Row>& h, double residual, double sigma) const {
+    Innovation innovation;
+    innovation.value = residual;
+    innovation.variance = covariance_.variance(h, err::nu) + sigma * sigma;
+    innovation.gate = gate_.quantile(1);
+    innovation.fits = gate_.fits(residual, innovation.variance);
+    return innovation;
+  }
+
+  /// Gates each row by itself, then updates once with those for which admit(row, innovation) is true, their noise
+  /// divided by `weight`. True if there were any.
+  template <int kMax, typename Admit>
+  bool apply(GroundRows<kMax>& z, double weight, CameraUpdate calibration, const Admit& admit) {
+    int kept = 0;
+    for (int row = 0; row < z.count; ++row) {
+      if (!admit(row, test(z.H.row(row), z.residual(row), z.sigma(row)))) continue;
+      const double whitening = weight / z.sigma(row);
+      z.H.row(kept) = whitening * z.H.row(row);
+      z.residual(kept++) = whitening * z.residual(row);
+    }
+    if (kept > 0) apply(z.H.topRows(kept), err::nu, z.residual.head(kept), calibration);
+    return kept > 0;
+  }
+
+  /// Updates by whitened rows: residual = H e(first_column ...) + n, cov(n) = I. `by_images`: for BiasChanges.
+  void apply(const Eigen::Ref<const Eigen::MatrixXd>& H, int first_column, const Eigen::Ref<const Eigen::VectorXd>& r,
+             CameraUpdate calibration, bool by_images = false);
+
+  /// The body's pose now joins the window. `feature_noise`: of what was seen from it, times the usual.
+  void clone(double feature_noise);
+  void marginalise(std::size_t clone);
+
+  /// The vehicle may be turned, faster and elsewhere by these standard deviations [rad, m/s, m], each axis, whatever
+  /// was measured so far.
+  void inflate_motion(double rotation, double velocity, double position);
+  /// The biases may be elsewhere: gyroscope [rad/s], accelerometer [m/s^2].
+  void inflate_biases(double gyro, double accel);
+  /// The ground's normal is this one, and as little known as before the lasers saw it.
+  void restart_normal(const Eigen::Vector3d& n_W);
+
+  /// Since the last call.
+  [[nodiscard]] BiasChanges take_bias_changes();
+  /// What updates did so far was misled by another source.
+  void discard_bias_changes();
+
+  [[nodiscard]] const State& state() const { return state_; }
+  [[nodiscard]] const Covariance& covariance() const { return covariance_; }
+  [[nodiscard]] const Gate& gate() const { return gate_; }
+  /// Mean rate of the last piece integrated, bias removed [rad/s].
+  [[nodiscard]] const Eigen::Vector3d& rate_B() const { return rate_B_; }
+  /// Are the state and its covariance numbers, and no variance negative?
+  [[nodiscard]] bool possible() const;
+  /// Covariance of the ordinary errors (estimate_error), with the scale that nothing measures where `scale_sigma` > 0.
+  [[nodiscard]] ImuErrorMatrix ordinary_covariance(double scale_sigma) const;
+
+ private:
+  Calibration calibration_;
+  double normal_prior_;  ///< [rad]
+  Gate gate_;
+  bool running_ = false;
+  State state_;
+  Covariance covariance_;
+  Eigen::Vector3d rate_B_ = Eigen::Vector3d::Zero();
+  std::uint64_t next_frame_ = 0;
+  BiasChanges bias_changes_;
+};
+
+}  // namespace ear

@@ -1,0 +1,31 @@
+// How far the body goes until the next frame by the inertial samples, p^I of (13). docs/anomaly.md.
+#pragma once
+
+#include <Eigen/Core>
+
+#include "ear/calibration.h"
+#include "filter/ekf/covariance.h"
+#include "filter/ekf/displacement.h"
+#include "filter/ekf/state.h"
+#include "filter/ingest/imu_buffer.h"
+
+namespace ear {
+
+/// The IMU's samples from i to j, from the state at i on. Vectors are in B_i.
+struct ImuMotion {
+  double duration = 0.0;  ///< [s]
+  Eigen::Vector3d p_BiBj = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d R_BiBj = Eigen::Matrix3d::Identity();
+  Eigen::Matrix<double, 3, err::imu_size> H = Eigen::Matrix<double, 3, err::imu_size>::Zero();  ///< p by the error at i
+  double position_variance = 0.0;  ///< of each axis, by the accelerometer's noise meanwhile [m^2]
+  double rotation_variance = 0.0;  ///< of each axis, by the gyroscope's [rad^2]
+};
+
+/// Integrates the samples from x.t_ns to `to_ns`.
+[[nodiscard]] ImuMotion imu_motion(const ImuState& x, const ImuBuffer& samples, TimeNs to_ns,
+                                   const ImuCalibration& noise);
+
+/// `P`: covariance of the error at i.
+[[nodiscard]] Displacement imu_displacement(const ImuMotion& motion, const Covariance& P);
+
+}  // namespace ear

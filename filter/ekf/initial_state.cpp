@@ -1,0 +1,92 @@
+#include "filter/ekf/initial_state.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+#include "filter/ekf/so3.h"
+
+namespace ear {
+namespace {
+
+void require(bool condition, const char* what) {
+  if (!condition) throw std::invalid_argument(what);
+}
+
+}  // namespace
+
+const FilterConfig& checked(const FilterConfig& config) {
+  require(config.window >= 3, "filter.window: at least 3 clones are needed");
+  require(config.window <= 60, "filter.window: at most 60 clones");
+  require(config.max_track_updates >= 1, "filter.max_track_updates: at least 1");
+  require(config.max_track_updates <= 1000, "filter.max_track_updates: at most 1000");
+  require(config.feature_sigma_px > 0.0, "filter.feature_sigma_px: must be positive");
+  require(config.huber_px > 0.0, "filter.huber_px: must be positive");
+  require(config.gate_probability > 0.0 && config.gate_probability < 1.0, "filter.gate_probability: between 0 and 1");
+  const AnomalyConfig& anomaly = config.anomaly;
+  require(anomaly.distance > 0.0, "filter.anomaly.distance: must be positive");
+  require(anomaly.false_alarm > 0.0 && anomaly.false_alarm < 1.0, "filter.anomaly.false_alarm: between 0 and 1");
+  require(anomaly.min_weight > 0.0 && anomaly.min_weight <= 1.0, "filter.anomaly.min_weight: above 0, at most 1");
+  return config;
+}
+
+const Calibration& checked(const Calibration& calibration) {
+  require(!calibration.cameras.empty() || calibration.encoder, "calibration: a camera or wheels are needed");
+  require(calibration.cameras.size() <= 2, "calibration: at most two cameras");
+  for (const CameraCalibration& camera : calibration.cameras) {
+    require(camera.fu > 0.0 && camera.fv > 0.0, "calibration: a camera's focal lengths must be positive");
+    const Eigen::Matrix3d R = camera.T_BC.linear();
+    require((R * R.transpose() - Eigen::Matrix3d::Identity()).norm() < 1e-3 && R.determinant() > 0.0,
+            "calibration: a camera's T_BS holds no rotation");
+  }
+  require(calibration.imu.gyro_noise > 0.0 && calibration.imu.accel_noise > 0.0,
+          "calibration: imu noise must be positive");
+  if (const auto& encoder = calibration.encoder) {
+    require(encoder->wheel_radius[0] > 0.0 && encoder->wheel_radius[1] > 0.0,
+            "calibration: wheel_radius must be positive");
+    require(encoder->track_width > 0.0, "calibration: track_width must be positive");
+    require(encoder->resolution > 0, "calibration: encoder resolution must be positive");
+    const Eigen::Matrix3d R = encoder->T_BO.linear();
+    require((R * R.transpose() - Eigen::Matrix3d::Identity()).norm() < 1e-3 && R.determinant() > 0.0,
+            "calibration: the encoder's T_BS holds no rotation");
+  }
+  if (const auto& lasers = calibration.lasers) {
+    require(lasers->beams.size() <= kMaxBeams, "calibration: at most three laser beams");
+    for (const LaserBeam& beam : lasers->beams) {
+      require(std::abs(beam.d_B.norm() - 1.0) < 1e-2, "calibration: a laser's direction must have length one");
+    }
+  }
+  return calibration;
+}
+
+double focal_length(const Calibration& calibration) {
+  if (calibration.cameras.empty()) return 1.0;
+  return 0.5 * (calibration.cameras[0].fu + calibration.cameras[0].fv);
+}
+
+CameraState camera_state(const Calibration& calibration) {
+  CameraState camera;
+  camera.time_offset = calibration.camera_time_offset;
+  if (calibration.cameras.empty()) return camera;
+  const Eigen::Isometry3d& T_BC0 = calibration.cameras.front().T_BC;
+  camera.T_BC0 = {renormalized(T_BC0.linear()), T_BC0.translation()};
+  const Eigen::Isometry3d T_C0C1 = T_BC0.inverse() * calibration.cameras.back().T_BC;
+  camera.T_C0C1 = {renormalized(T_C0C1.linear()), T_C0C1.translation()};
+  return camera;
+}
+
+OdometerState odometer_state(const Calibration& calibration) {
+  OdometerState odometer;
+  if (const auto& encoder = calibration.encoder) {
+    odometer.wheel_radius << encoder->wheel_radius[0], encoder->wheel_radius[1];
+    odometer.track_width = encoder->track_width;
+    odometer.T_BO = {renormalized(encoder->T_BO.linear()), encoder->T_BO.translation()};
+  }
+  if (const auto& lasers = calibration.lasers) {
+    for (std::size_t i = 0; i < lasers->beams.size(); ++i) odometer.d_B[i] = lasers->beams[i].d_B.normalized();
+  }
+  return odometer;
+}
+
+}  // namespace ear

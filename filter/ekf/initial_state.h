@@ -1,0 +1,21 @@
+// What configuration and calibration make of a filter before the first sample: whether they can be used at all, and the
+// calibrated part of the state.
+#pragma once
+
+#include "ear/calibration.h"
+#include "ear/filter_config.h"
+#include "filter/ekf/state.h"
+
+namespace ear {
+
+/// The same, if they are usable. Throw std::invalid_argument, naming the field.
+[[nodiscard]] const FilterConfig& checked(const FilterConfig& config);
+[[nodiscard]] const Calibration& checked(const Calibration& calibration);
+
+/// Pixels per unit of normalized coordinates; 1 without a camera, where nothing is measured in pixels.
+[[nodiscard]] double focal_length(const Calibration& calibration);
+
+[[nodiscard]] CameraState camera_state(const Calibration& calibration);
+[[nodiscard]] OdometerState odometer_state(const Calibration& calibration);
+
+}  // namespace ear

@@ -1,0 +1,97 @@
+#include "filter/ekf/propagation.h"
+
+namespace ear {
+
+ImuState integrate(const ImuState& x, const Eigen::Vector3d& gyro_B, const Eigen::Vector3d& accel_B, double dt) {
+  const Eigen::Vector3d phi = (gyro_B - x.b_g) * dt;
+  const Eigen::Vector3d f_B = accel_B - x.b_a;
+  ImuState next = x;
+  next.R_WB = renormalized(x.R_WB * exp_so3(phi));
+  next.v_W = x.v_W + kGravity_W * dt + x.R_WB * (gamma<1>(phi) * f_B) * dt;
+  next.p_WB = x.p_WB + x.v_W * dt + 0.5 * kGravity_W * dt * dt + x.R_WB * (gamma<2>(phi) * f_B) * dt * dt;
+  next.t_ns = x.t_ns + static_cast<TimeNs>(std::llround(dt * 1e9));
+  return next;
+}
+
+ImuState integrate_to(TimeNs t_ns, ImuState x, const ImuBuffer& samples) {
+  if (t_ns <= x.t_ns) return x;
+  samples.for_each_piece(x.t_ns, t_ns, [&](const Eigen::Vector3d& gyro_B, const Eigen::Vector3d& accel_B, double dt) {
+    x = integrate(x, gyro_B, accel_B, dt);
+  });
+  x.t_ns = t_ns;
+  return x;
+}
+
+BodyMotion motion_at(TimeNs t_ns, const ImuState& x, const ImuBuffer& samples) {
+  BodyMotion motion{x.R_WB, x.v_W};
+  if (t_ns >= x.t_ns) return motion;
+  Eigen::Matrix3d turned = Eigen::Matrix3d::Identity();  // from the body then to the body now
+  Eigen::Vector3d gained = Eigen::Vector3d::Zero();      // velocity, in the body then, without gravity
+  samples.for_each_piece(t_ns, x.t_ns, [&](const Eigen::Vector3d& gyro_B, const Eigen::Vector3d& accel_B, double dt) {
+    gained += turned * (accel_B - x.b_a) * dt;
+    turned *= exp_so3((gyro_B - x.b_g) * dt);
+  });
+  motion.R_WB = x.R_WB * turned.transpose();
+  motion.v_W = x.v_W - kGravity_W * seconds_between(t_ns, x.t_ns) - motion.R_WB * gained;
+  return motion;
+}
+
+Eigen::Matrix3d gyro_rotation(TimeNs from_ns, TimeNs to_ns, const Eigen::Vector3d& b_g, const ImuBuffer& samples) {
+  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
+  samples.for_each_piece(from_ns, to_ns, [&](const Eigen::Vector3d& gyro_B, const Eigen::Vector3d&, double dt) {
+    R *= exp_so3((gyro_B - b_g) * dt);
+  });
+  return R;
+}
+
+NavState nav_state(const ImuState& x) {
+  return {x.t_ns, Eigen::Quaterniond(x.R_WB).normalized(), x.p_WB, x.v_W, x.b_g, x.b_a};
+}
+
+ErrorTransition error_transition(const ImuState& x, const Eigen::Vector3d& gyro_B, const Eigen::Vector3d& accel_B,
+                                 double dt, const ImuCalibration& noise) {
+  const Eigen::Vector3d phi = (gyro_B - x.b_g) * dt;
+  const Eigen::Vector3d f_B = accel_B - x.b_a;
+  const Eigen::Matrix3d G1 = gamma<1>(phi);
+  const Eigen::Matrix3d G2 = gamma<2>(phi);
+  const Eigen::Vector3d v_next = x.v_W + kGravity_W * dt + x.R_WB * (G1 * f_B) * dt;
+  const Eigen::Vector3d p_next = x.p_WB + x.v_W * dt + 0.5 * kGravity_W * dt * dt + x.R_WB * (G2 * f_B) * dt * dt;
+
+  // What an error of the rate, and one of the force, each constant over dt, does to (theta, nu, rho).
+  Eigen::Matrix<double, 9, 3> B_gyro;
+  B_gyro.topRows<3>() = -x.R_WB * G1 * dt;
+  B_gyro.middleRows<3>(3) = -x.R_WB * gamma_derivative<1>(phi, f_B) * (dt * dt) + skew(v_next) * B_gyro.topRows<3>();
+  B_gyro.bottomRows<3>() =
+      -x.R_WB * gamma_derivative<2>(phi, f_B) * (dt * dt * dt) + skew(p_next) * B_gyro.topRows<3>();
+  Eigen::Matrix<double, 9, 3> B_accel;
+  B_accel.topRows<3>().setZero();
+  B_accel.middleRows<3>(3) = -x.R_WB * G1 * dt;
+  B_accel.bottomRows<3>() = -x.R_WB * G2 * (dt * dt);
+
+  ErrorTransition step;
+  const Eigen::Matrix3d g_cross = skew(kGravity_W);
+  step.Phi.block<3, 3>(err::nu, err::theta) = g_cross * dt;
+  step.Phi.block<3, 3>(err::rho, err::theta) = 0.5 * g_cross * dt * dt;
+  step.Phi.block<3, 3>(err::rho, err::nu) = Eigen::Matrix3d::Identity() * dt;
+  step.Phi.block<9, 3>(err::theta, err::b_g) = B_gyro;
+  step.Phi.block<9, 3>(err::theta, err::b_a) = B_accel;
+
+  // White noise of density s has the variance s^2 / dt in a mean over dt; it enters where a bias would.
+  step.Q.topLeftCorner<9, 9>() = B_gyro * (noise.gyro_noise * noise.gyro_noise / dt) * B_gyro.transpose() +
+                                 B_accel * (noise.accel_noise * noise.accel_noise / dt) * B_accel.transpose();
+  step.Q.diagonal().segment<3>(err::b_g).setConstant(noise.gyro_random_walk * noise.gyro_random_walk * dt);
+  step.Q.diagonal().segment<3>(err::b_a).setConstant(noise.accel_random_walk * noise.accel_random_walk * dt);
+  return step;
+}
+
+void chain(ErrorTransition& total, const ErrorTransition& step) {
+  carry_columns(step.Phi, total.Q);
+  total.Q.transposeInPlace();
+  carry_columns(step.Phi, total.Q);
+  total.Q += step.Q;
+  total.Phi.transposeInPlace();
+  carry_columns(step.Phi, total.Phi);
+  total.Phi.transposeInPlace();
+}
+
+}  // namespace ear

@@ -1,0 +1,66 @@
+// IMU integration and how it carries the error along. Derivation: docs/filter.md, section 2.
+#pragma once
+
+#include <Eigen/Core>
+
+#include "ear/calibration.h"
+#include "ear/estimate.h"
+#include "filter/ekf/state.h"
+#include "filter/ingest/imu_buffer.h"
+
+namespace ear {
+
+using ImuErrorMatrix = Eigen::Matrix<double, err::imu_size, err::imu_size>;
+
+/// An error over an interval: x_end = Phi x_start + w, cov(w) = Q. Intervals chain. Of Phi only the blocks that
+/// carry_columns() names differ from those of the identity matrix.
+struct ErrorTransition {
+  ImuErrorMatrix Phi = ImuErrorMatrix::Identity();
+  ImuErrorMatrix Q = ImuErrorMatrix::Zero();
+};
+
+/// The state `dt` seconds on, with body-frame rate [rad/s] and specific force [m/s^2] constant meanwhile. Biases are
+/// those of the state. Exact for constant inputs.
+[[nodiscard]] ImuState integrate(const ImuState& x, const Eigen::Vector3d& gyro_B, const Eigen::Vector3d& accel_B,
+                                 double dt);
+
+/// The state at `t_ns`, carried there by the samples; as it is if that is not later.
+[[nodiscard]] ImuState integrate_to(TimeNs t_ns, ImuState x, const ImuBuffer& samples);
+
+/// Attitude and velocity at a time.
+struct BodyMotion {
+  Eigen::Matrix3d R_WB;
+  Eigen::Vector3d v_W;
+};
+/// At `t_ns`, taken back there by the samples if the state `x` has passed it; else those of the state.
+[[nodiscard]] BodyMotion motion_at(TimeNs t_ns, const ImuState& x, const ImuBuffer& samples);
+
+/// The rotation from one time to another by the gyroscope, its bias `b_g` removed: R_B0B1.
+[[nodiscard]] Eigen::Matrix3d gyro_rotation(TimeNs from_ns, TimeNs to_ns, const Eigen::Vector3d& b_g,
+                                            const ImuBuffer& samples);
+
+/// The state as users get it.
+[[nodiscard]] NavState nav_state(const ImuState& x);
+
+/// How the error of `x` goes over into that of integrate(x, ...), and the noise that comes in on the way.
+[[nodiscard]] ErrorTransition error_transition(const ImuState& x, const Eigen::Vector3d& gyro_B,
+                                               const Eigen::Vector3d& accel_B, double dt, const ImuCalibration& noise);
+
+/// M Phi^T in the place of M, of which the first columns belong to the inertial errors: the biases' stay. With M = P
+/// this is one half of Phi P Phi^T; the products are those of 3 x 3 blocks that are not zero.
+template <typename Matrix>
+void carry_columns(const ImuErrorMatrix& Phi, Eigen::MatrixBase<Matrix>& M) {
+  const auto add = [&](int to, int from) {
+    for (int j = to; j < to + 3; ++j) {
+      M.col(j) += Phi(j, from) * M.col(from) + Phi(j, from + 1) * M.col(from + 1) + Phi(j, from + 2) * M.col(from + 2);
+    }
+  };
+  for (const int from : {err::theta, err::nu, err::b_g, err::b_a}) add(err::rho, from);
+  for (const int from : {err::theta, err::b_g, err::b_a}) add(err::nu, from);
+  add(err::theta, err::b_g);
+}
+
+/// `total` followed by `step`.
+void chain(ErrorTransition& total, const ErrorTransition& step);
+
+}  // namespace ear

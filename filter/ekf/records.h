@@ -1,0 +1,49 @@
+// What came of the measurements of one frame: the innovation record of every sensor, and counts.
+#pragma once
+
+#include <array>
+
+#include "ear/estimate.h"
+#include "ear/health.h"
+
+namespace ear {
+
+/// An innovation against what was expected of it.
+struct Innovation {
+  double value = 0.0;     ///< measured - predicted
+  double variance = 0.0;  ///< as expected, the state's share included
+  double gate = 0.0;      ///< quantile of value^2 / variance
+  bool fits = false;      ///< it passed the gate
+};
+
+/// One record a sensor: its last innovation, and how many fitted.
+class InnovationLog {
+ public:
+  /// A new frame: counts start from zero; what was measured last stays.
+  void start_frame();
+
+  void add(Source source, const Innovation& innovation, TimeNs t_ns);
+
+  /// The features of one camera.
+  struct Features {
+    int used = 0;
+    int rejected = 0;
+    double rms_px = 0.0;        ///< of all observations tested [px]
+    double variance_px2 = 0.0;  ///< expected [px^2]
+    double gate = 0.0;          ///< of the squared distance of one observation
+  };
+  void add(Source source, const Features& features, TimeNs t_ns);
+
+  [[nodiscard]] const std::array<SourceRecord, kSourceCount>& records() const { return records_; }
+
+ private:
+  std::array<SourceRecord, kSourceCount> records_{};
+};
+
+/// What the sources write while a frame is processed.
+struct Records {
+  FrameStatistics statistics;
+  InnovationLog log;
+};
+
+}  // namespace ear

@@ -1,0 +1,116 @@
+// The state, and what an error of it means. Only boxplus and boxminus know the error's definition (docs/filter.md, 1):
+//   R = Exp(theta) R^, v = Exp(theta) v^ + nu, p = Exp(theta) p^ + rho; clones alike; n = Exp(theta) Exp(B delta) n^;
+//   biases and calibration additive, wheels relative, rotations of the cameras R = Exp(phi) R^, of the odometer
+//   R = R^ Exp(phi).
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <vector>
+
+#include "ear/types.h"
+#include "filter/ekf/so3.h"
+#include "filter/ingest/beam_ranges.h"
+
+namespace ear {
+
+inline const Eigen::Vector3d kGravity_W{0.0, 0.0, -9.81};  ///< [m/s^2]
+
+/// Where each quantity's error stands in the error vector. What wheels and lasers measure lies together, before the
+/// camera's part; that is last, so that its measurements touch one contiguous range too: the calibration of the
+/// cameras, then the clones, oldest first.
+namespace err {
+inline constexpr int theta = 0, nu = 3, rho = 6, b_g = 9, b_a = 12;
+inline constexpr int imu_size = 15;
+inline constexpr int normal = imu_size;           ///< delta, tilt of the ground's normal [rad]: 2
+inline constexpr int wheel_radius = normal + 2;   ///< left, right, relative: 2
+inline constexpr int track_width = normal + 4;    ///< relative: 1
+inline constexpr int odometer = normal + 5;       ///< phi, turn of O about its own axes [rad]: 3
+inline constexpr int beams = odometer + 3;        ///< tilt of each laser beam [rad]
+inline constexpr int camera = beams + kMaxBeams;  ///< phi, p of camera 0 in the body: 6
+inline constexpr int stereo = camera + 6;         ///< phi, p of camera 1 in camera 0: 6
+inline constexpr int time_offset = stereo + 6;    ///< [s]
+inline constexpr int calibration_size = 13;
+inline constexpr int clones = camera + calibration_size;
+inline constexpr int clone_size = 6;  ///< theta, rho
+[[nodiscard]] constexpr int clone(int index) { return clones + clone_size * index; }
+}  // namespace err
+
+/// Columns of a wheel or laser row: from err::nu to the end of the beams.
+inline constexpr int kGroundColumns = err::camera - err::nu;
+/// Column of an entry of the error vector in such a row.
+[[nodiscard]] constexpr int ground_column(int entry) { return entry - err::nu; }
+
+struct Pose {
+  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d p = Eigen::Vector3d::Zero();
+};
+
+/// The inertial part: what IMU samples propagate.
+struct ImuState {
+  TimeNs t_ns = 0;
+  Eigen::Matrix3d R_WB = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d v_W = Eigen::Vector3d::Zero();
+  Eigen::Vector3d p_WB = Eigen::Vector3d::Zero();
+  Eigen::Vector3d b_g = Eigen::Vector3d::Zero();
+  Eigen::Vector3d b_a = Eigen::Vector3d::Zero();
+};
+
+/// The plane that the wheels stand on.
+struct GroundState {
+  Eigen::Vector3d n_W = Eigen::Vector3d::UnitZ();  ///< its unit normal, upwards
+};
+
+/// Wheels and lasers as the filter knows them.
+struct OdometerState {
+  Eigen::Vector2d wheel_radius = Eigen::Vector2d::Ones();  ///< left, right [m]
+  double track_width = 1.0;                                ///< [m]
+  Pose T_BO;                                               ///< middle of the axle to body
+  std::array<Eigen::Vector3d, kMaxBeams> d_B;              ///< directions of the laser beams
+
+  OdometerState() { d_B.fill(-Eigen::Vector3d::UnitZ()); }
+};
+
+/// The cameras' geometry as the filter knows it.
+struct CameraState {
+  Pose T_BC0;                ///< camera 0 to body
+  Pose T_C0C1;               ///< camera 1 to camera 0
+  double time_offset = 0.0;  ///< [s] add to a camera stamp to get IMU time
+};
+
+/// A camera's stamp by the clock of the IMU, and the other way round.
+[[nodiscard]] TimeNs imu_time(TimeNs camera_time_ns, const CameraState& camera);
+[[nodiscard]] TimeNs camera_time(TimeNs imu_time_ns, const CameraState& camera);
+
+/// The body's pose at a past frame.
+struct Clone {
+  std::uint64_t frame = 0;  ///< number of the frame, never used again
+  Pose T_WB;
+  double feature_noise = 1.0;  ///< standard deviation of what was seen from it, times the usual
+};
+
+struct State {
+  ImuState imu;
+  GroundState ground;
+  OdometerState odometer;
+  CameraState camera;
+  std::vector<Clone> clones;  ///< oldest first
+
+  [[nodiscard]] int error_size() const { return err::clone(static_cast<int>(clones.size())); }
+};
+
+/// Two unit vectors, as columns, that span the plane perpendicular to the unit vector n; smooth except at n = -z.
+[[nodiscard]] Eigen::Matrix<double, 3, 2> tangent_basis(const Eigen::Vector3d& n);
+
+/// The unit axis about which an error of a beam's direction d turns it: the one that changes its range on a ground
+/// perpendicular to `up`.
+[[nodiscard]] Eigen::Vector3d tilt_axis(const Eigen::Vector3d& d, const Eigen::Vector3d& up);
+
+/// x with the error d applied; d has x.error_size() entries.
+void boxplus_in_place(State& x, const Eigen::Ref<const Eigen::VectorXd>& d);
+[[nodiscard]] State boxplus(const State& x, const Eigen::Ref<const Eigen::VectorXd>& d);
+
+/// The error d for which boxplus(estimate, d) is `truth`. Both have the same clones.
+[[nodiscard]] Eigen::VectorXd boxminus(const State& truth, const State& estimate);
+
+}  // namespace ear

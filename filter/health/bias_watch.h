@@ -1,0 +1,28 @@
+// Did the bias of the gyroscope or of the accelerometer jump? Sound biases walk slowly, and each update corrects them
+// about as much as it lowers their variance. Corrections that add up to more than these variances allow tell of a bias
+// that is elsewhere. docs/filter.md, section 15.
+#pragma once
+
+#include "filter/ekf/ekf.h"
+
+namespace ear {
+
+/// Which of the inertial sensors' biases jumped?
+struct BiasJump {
+  bool gyro = false;
+  bool accel = false;
+  [[nodiscard]] bool any() const { return gyro || accel; }
+};
+
+class BiasWatch {
+ public:
+  /// What all updates since the last call did, the state now being at `t_ns`. What speaks for a jump is forgotten when
+  /// it was reported. Updates by images are believed sooner: wheels that leave the ground unnoticed mislead.
+  BiasJump judge(const BiasChanges& changes, TimeNs t_ns);
+
+ private:
+  BiasChange all_, by_images_;
+  TimeNs judged_ns_ = 0;
+};
+
+}  // namespace ear

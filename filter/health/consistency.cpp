@@ -1,0 +1,114 @@
+#include "filter/health/consistency.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+namespace ear {
+namespace {
+
+constexpr int kDimensions = 3;
+constexpr std::size_t I = index_of(MotionSensor::imu);
+constexpr std::size_t O = index_of(MotionSensor::odometer);
+constexpr std::size_t C = index_of(MotionSensor::camera);
+
+/// Distances between the displacements, each named by the sensor that it does not concern.
+using Distances = std::array<double, kMotionSensors>;
+
+double distance_between(const Displacement& x, const Displacement& y, AnomalyScore score) {
+  const Eigen::Vector3d difference = x.p_BiBj - y.p_BiBj;
+  if (score == AnomalyScore::distance) return difference.norm();
+  const Eigen::Matrix3d S = x.covariance + y.covariance;
+  return std::sqrt(std::max(0.0, difference.dot(S.ldlt().solve(difference))));
+}
+
+/// (13) [m^2], over the displacements there are.
+double variance_of(const Displacements& displacements, int count) {
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const Displacement& d : displacements) {
+    if (d.available) mean += d.p_BiBj / count;
+  }
+  double variance = 0.0;
+  for (const Displacement& d : displacements) {
+    if (d.available) variance += (d.p_BiBj - mean).squaredNorm() / count;
+  }
+  return variance;
+}
+
+/// The least sum of squared normalized distances from one common displacement: chi-squared, with three degrees of
+/// freedom for every displacement but one.
+double chi_squared_of(const Displacements& displacements) {
+  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d weighted = Eigen::Vector3d::Zero();
+  double squares = 0.0;
+  for (const Displacement& d : displacements) {
+    if (!d.available) continue;
+    const Eigen::Matrix3d inverse = d.covariance.ldlt().solve(Eigen::Matrix3d::Identity());
+    const Eigen::Vector3d product = inverse * d.p_BiBj;
+    information += inverse;
+    weighted += product;
+    squares += d.p_BiBj.dot(product);
+  }
+  return std::max(0.0, squares - weighted.dot(information.ldlt().solve(weighted)));
+}
+
+/// (15), before it is limited. Design note: what is printed gives each sensor a formula of its own.
+double weight_of(std::size_t sensor, const Distances& between_others, AnomalyWeight form) {
+  const double IO = between_others[C];
+  const double IC = between_others[O];
+  const double OC = between_others[I];
+  if (form == AnomalyWeight::printed) {
+    if (sensor == I) return 0.5 * (OC / IO + IC / IC);
+    if (sensor == O) return 0.5 * (IC / IO + IO / OC);
+    return 0.5 * (OC / IC + IO / IC);
+  }
+  const double others = between_others[sensor];
+  const double to_first = between_others[(sensor + 1) % kMotionSensors];
+  const double to_second = between_others[(sensor + 2) % kMotionSensors];
+  return 0.5 * others * (1.0 / to_first + 1.0 / to_second);
+}
+
+}  // namespace
+
+ConsistencyCheck::ConsistencyCheck(const AnomalyConfig& config)
+    : config_(config), gate_(1.0 - config.false_alarm, kDimensions * static_cast<int>(kMotionSensors - 1)) {}
+
+Consistency ConsistencyCheck::operator()(const Displacements& displacements) const {
+  Consistency result;
+  int count = 0;
+  for (std::size_t i = 0; i < kMotionSensors; ++i) {
+    result.available[i] = displacements[i].available;
+    result.weight[i] = result.available[i] ? 1.0 : 0.0;
+    count += result.available[i] ? 1 : 0;
+    if (displacements[i].contradictory) result.anomalous = static_cast<MotionSensor>(i);
+  }
+  if (count < 2) return result;
+
+  Distances between_others{};
+  for (std::size_t x = 0; x < kMotionSensors; ++x) {
+    const std::size_t y = (x + 1) % kMotionSensors;
+    if (!displacements[x].available || !displacements[y].available) continue;
+    const double distance = distance_between(displacements[x], displacements[y], config_.score);
+    between_others[kMotionSensors - x - y] = distance;
+    result.coefficient[x] += distance;  // (14)
+    result.coefficient[y] += distance;
+  }
+  result.variance = variance_of(displacements, count);
+  if (config_.score == AnomalyScore::distance) {
+    result.score = std::sqrt(result.variance);
+    result.threshold = config_.distance;
+  } else {
+    result.score = std::sqrt(chi_squared_of(displacements));
+    result.threshold = std::sqrt(gate_.quantile(kDimensions * (count - 1)));
+  }
+  if (count < static_cast<int>(kMotionSensors) || !result.disagree()) return result;
+
+  const auto worst = static_cast<std::size_t>(std::max_element(result.coefficient.begin(), result.coefficient.end()) -
+                                              result.coefficient.begin());
+  result.anomalous = static_cast<MotionSensor>(worst);
+  const double weight = weight_of(worst, between_others, config_.weight);
+  result.weight[worst] = std::isfinite(weight) ? std::clamp(weight, config_.min_weight, 1.0) : config_.min_weight;
+  return result;
+}
+
+}  // namespace ear

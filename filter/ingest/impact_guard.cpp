@@ -1,0 +1,80 @@
+#include "filter/ingest/impact_guard.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace ear {
+namespace {
+
+constexpr double kSpread = 4.0;        // deviations from the mean, in standard deviations, are ordinary
+constexpr double kAccelShare = 0.1;    // of a deviation: bandwidth, scale and timing make that much of it wrong
+constexpr double kGyroShare = 1.0;     // no body turns so suddenly: as much as a limit that is not known yet may hide
+constexpr double kLongest = 0.06;      // [s] a longer deviation is no strike, but how the vehicle moves
+constexpr double kFull = 0.98;         // of the range or more is clipped
+constexpr double kFlat = 1e-6;         // relative: two extreme values as equal as this were cut off
+constexpr double kGyroMemory = 0.05;   // [s] bodies turn fast, but not suddenly
+constexpr double kAccelMemory = 0.2;   // [s]
+constexpr double kSpreadMemory = 2.5;  // times the memory of the mean
+
+}  // namespace
+
+double ExcessWatch::add(const Eigen::Vector3d& value, double dt) {
+  if (!any_) {
+    any_ = true;
+    last_ = mean_ = value;
+  }
+  const Eigen::Vector3d deviation = value - mean_;
+  const double distance = deviation.norm();
+  const double ordinary = std::max(least_, kSpread * std::sqrt(variance_));
+  const bool limit_known = range_ > 0.0 || clip_level_ > 0.0;
+  const bool cut_off = clipped(value);
+  last_ = value;
+
+  const bool strikes = distance > ordinary;
+  lasts_ = strikes || cut_off ? lasts_ + 1 : 0;
+  clipped_before_ = cut_off && !limit_known ? lasts_ - 1 : 0;
+  lasting_ = lasts_ > 1 ? lasting_ + dt : 0.0;
+  const bool strike = strikes && lasting_ < kLongest;
+
+  // What is out of the ordinary counts as if it were at its limit: one strike does not move the mean, and a lasting
+  // change becomes the new mean. Nor do strikes, however many, make strikes ordinary: that takes what lies between.
+  const double counted = std::min(distance, ordinary);
+  const double share = 1.0 - std::exp(-dt / memory_);
+  if (distance > 0.0) mean_ += share * counted / distance * deviation;
+  if (!strike) variance_ += (1.0 - std::exp(-dt / (kSpreadMemory * memory_))) * (counted * counted - variance_);
+
+  // The errors of one strike have one sign. White noise adds up as they do if the k-th sample has 2 k - 1 times the
+  // variance: n samples then have n^2 times that of one.
+  const double coherent = std::sqrt(std::max(0.0, 2.0 * lasts_ - 1.0));
+  if (cut_off) return coherent * std::max(distance, least_);
+  return strike ? coherent * error_share_ * distance : 0.0;
+}
+
+/// At the end of a known range; or, where it is not known, at the level of a flat top: the same extreme value twice.
+bool ExcessWatch::clipped(const Eigen::Vector3d& value) {
+  const double largest = value.cwiseAbs().maxCoeff();
+  if (range_ > 0.0) return largest > kFull * range_;
+  if (largest > (1.0 + kFlat) * clip_level_) clip_level_ = 0.0;  // it was no limit
+  for (int axis = 0; axis < 3; ++axis) {
+    const bool extreme = std::abs(value(axis) - mean_(axis)) > least_;
+    if (extreme && std::abs(value(axis) - last_(axis)) < kFlat * std::abs(value(axis))) {
+      clip_level_ = std::max(clip_level_, std::abs(value(axis)));
+    }
+  }
+  return clip_level_ > 0.0 && largest > (1.0 - kFlat) * clip_level_;
+}
+
+ImpactGuard::ImpactGuard(const ImpactConfig& config, const ImuCalibration& imu)
+    : gyro_(config.gyro_range, config.gyro_deviation, kGyroMemory, kGyroShare),
+      accel_(config.accel_range, config.accel_deviation, kAccelMemory, kAccelShare),
+      gyro_sigma_(imu.gyro_noise * std::sqrt(imu.rate_hz)),
+      accel_sigma_(imu.accel_noise * std::sqrt(imu.rate_hz)) {}
+
+ImuNoiseFactors ImpactGuard::add(const ImuSample& sample) {
+  const double dt = last_ns_ ? seconds_between(*last_ns_, sample.t_ns) : 0.0;
+  last_ns_ = sample.t_ns;
+  return {std::hypot(1.0, gyro_.add(sample.gyro_B, dt) / gyro_sigma_),
+          std::hypot(1.0, accel_.add(sample.accel_B, dt) / accel_sigma_)};
+}
+
+}  // namespace ear

@@ -1,0 +1,59 @@
+// By how much an inertial sample is less certain than usual: a landing's strike, a spike, a clipped value.
+// docs/filter.md, section 12.
+#pragma once
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <optional>
+
+#include "ear/calibration.h"
+#include "ear/filter_config.h"
+#include "ear/types.h"
+#include "filter/ingest/imu_buffer.h"
+
+namespace ear {
+
+/// Watches one sensor of three axes.
+class ExcessWatch {
+ public:
+  /// `range`: largest value of an axis, 0 if it is not known. `least`: a smaller deviation from the recent mean is
+  /// none. `memory` [s]: what recent means. `error_share`: of a deviation, may be wrong. All else in the sensor's unit.
+  ExcessWatch(double range, double least, double memory, double error_share)
+      : range_(range), least_(least), memory_(memory), error_share_(error_share) {}
+
+  /// Standard deviation of what may be wrong with the value beyond the sensor's noise; 0 for an ordinary value.
+  double add(const Eigen::Vector3d& value, double dt);
+  /// How many values before the last one turn out, by it, to have been clipped as well.
+  [[nodiscard]] int clipped_before() const { return clipped_before_; }
+
+ private:
+  [[nodiscard]] bool clipped(const Eigen::Vector3d& value);
+
+  double range_, least_, memory_, error_share_;
+  double clip_level_ = 0.0;  ///< where values were seen to be cut off, 0 if never
+  bool any_ = false;
+  Eigen::Vector3d last_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d mean_ = Eigen::Vector3d::Zero();
+  double variance_ = 0.0;  ///< of the distance from the mean
+  int lasts_ = 0;          ///< samples in a row out of the ordinary
+  double lasting_ = 0.0;   ///< from the first of them to now [s]
+  int clipped_before_ = 0;
+};
+
+class ImpactGuard {
+ public:
+  ImpactGuard(const ImpactConfig& config, const ImuCalibration& imu);
+
+  /// Samples in time order, finite, as the sensor gives them. Whoever integrates over the piece between two samples
+  /// takes the larger factor.
+  ImuNoiseFactors add(const ImuSample& sample);
+  /// So many samples before the last one have its factors as well: that there is a limit was not known yet.
+  [[nodiscard]] int clipped_before() const { return std::max(gyro_.clipped_before(), accel_.clipped_before()); }
+
+ private:
+  ExcessWatch gyro_, accel_;
+  double gyro_sigma_, accel_sigma_;  ///< of a sample's white noise [rad/s], [m/s^2]
+  std::optional<TimeNs> last_ns_;
+};
+
+}  // namespace ear

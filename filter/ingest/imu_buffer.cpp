@@ -1,0 +1,107 @@
+#include "filter/ingest/imu_buffer.h"
+
+#include <cmath>
+
+namespace ear {
+
+void ImuBuffer::push(const ImuSample& sample, const ImuNoiseFactors& noise) {
+  samples_[slot(size_)] = sample;
+  noise_[slot(size_)] = noise;
+  if (size_ < samples_.size()) {
+    ++size_;
+  } else {
+    first_ = (first_ + 1) % samples_.size();
+  }
+}
+
+std::size_t ImuBuffer::first_after(TimeNs t_ns) const {
+  std::size_t low = 0;
+  std::size_t high = size_;
+  while (low < high) {
+    const std::size_t middle = (low + high) / 2;
+    if ((*this)[middle].t_ns > t_ns) {
+      high = middle;
+    } else {
+      low = middle + 1;
+    }
+  }
+  return low;
+}
+
+ImuSample ImuBuffer::interpolate(std::size_t next, TimeNs t_ns) const {
+  ImuSample result;
+  if (next == 0) {
+    result = (*this)[0];
+  } else if (next >= size_) {
+    result = newest();
+  } else {
+    const ImuSample& a = (*this)[next - 1];
+    const ImuSample& b = (*this)[next];
+    const double share = seconds_between(a.t_ns, t_ns) / seconds_between(a.t_ns, b.t_ns);
+    result.gyro_B = a.gyro_B + share * (b.gyro_B - a.gyro_B);
+    result.accel_B = a.accel_B + share * (b.accel_B - a.accel_B);
+  }
+  result.t_ns = t_ns;
+  return result;
+}
+
+void ImuBuffer::correct_newest(const Eigen::Vector3d& gyro_B, const Eigen::Vector3d& accel_B) {
+  ImuSample& newest = samples_[slot(size_ - 1)];
+  newest.gyro_B = gyro_B;
+  newest.accel_B = accel_B;
+  noise_[slot(size_ - 1)] = ImuNoiseFactors{};
+}
+
+void ImuBuffer::raise_newest_noise(std::size_t count, const ImuNoiseFactors& noise) {
+  for (std::size_t i = size_ - std::min(count, size_); i < size_; ++i) {
+    ImuNoiseFactors& factors = noise_[slot(i)];
+    factors = {std::max(factors.gyro, noise.gyro), std::max(factors.accel, noise.accel)};
+  }
+}
+
+ImuNoiseFactors ImuBuffer::noise_around(std::size_t next) const {
+  const ImuNoiseFactors& a = noise_[slot(next == 0 ? 0 : std::min(next, size_) - 1)];
+  const ImuNoiseFactors& b = noise_[slot(std::min(next, size_ - 1))];
+  return {std::max(a.gyro, b.gyro), std::max(a.accel, b.accel)};
+}
+
+MeanRate ImuBuffer::mean_rate(TimeNs from_ns, TimeNs to_ns) const {
+  MeanRate rate;
+  for_each_piece(from_ns, to_ns,
+                 [&](const Eigen::Vector3d& gyro_B, const Eigen::Vector3d&, double dt, const ImuNoiseFactors& noise) {
+                   rate.gyro_B += gyro_B * dt;
+                   rate.noise_factor = std::max(rate.noise_factor, noise.gyro);
+                 });
+  rate.gyro_B /= seconds_between(from_ns, to_ns);
+  return rate;
+}
+
+ImuStatistics ImuBuffer::statistics(TimeNs from_ns, TimeNs to_ns) const {
+  ImuStatistics s;
+  const std::size_t begin = first_after(from_ns - 1);
+  const std::size_t end = first_after(to_ns);
+  if (begin >= end) return s;
+  Eigen::Vector3d gyro_squares = Eigen::Vector3d::Zero();
+  Eigen::Vector3d accel_squares = Eigen::Vector3d::Zero();
+  const ImuSample& reference = (*this)[begin];  // differences to it keep the sum of squares exact
+  for (std::size_t i = begin; i < end; ++i) {
+    const Eigen::Vector3d gyro = (*this)[i].gyro_B - reference.gyro_B;
+    const Eigen::Vector3d accel = (*this)[i].accel_B - reference.accel_B;
+    s.gyro_mean += gyro;
+    s.accel_mean += accel;
+    gyro_squares += gyro.cwiseAbs2();
+    accel_squares += accel.cwiseAbs2();
+  }
+  const auto n = static_cast<double>(end - begin);
+  s.count = static_cast<int>(end - begin);
+  s.duration = seconds_between(reference.t_ns, (*this)[end - 1].t_ns);
+  s.gyro_mean /= n;
+  s.accel_mean /= n;
+  s.gyro_spread = std::sqrt(std::max(0.0, (gyro_squares / n - s.gyro_mean.cwiseAbs2()).maxCoeff()));
+  s.accel_spread = std::sqrt(std::max(0.0, (accel_squares / n - s.accel_mean.cwiseAbs2()).maxCoeff()));
+  s.gyro_mean += reference.gyro_B;
+  s.accel_mean += reference.accel_B;
+  return s;
+}
+
+}  // namespace ear

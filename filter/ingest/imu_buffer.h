@@ -1,0 +1,99 @@
+// The last seconds of inertial samples, in time order.
+#pragma once
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cstddef>
+#include <type_traits>
+#include <vector>
+
+#include "ear/types.h"
+
+namespace ear {
+
+/// Factors on the standard deviations of a sample's white noise, 1 or more.
+struct ImuNoiseFactors {
+  double gyro = 1.0;
+  double accel = 1.0;
+};
+
+/// Mean and spread of the samples of an interval.
+struct ImuStatistics {
+  int count = 0;
+  double duration = 0.0;  ///< [s] from the first sample used to the last
+  Eigen::Vector3d gyro_mean = Eigen::Vector3d::Zero();
+  Eigen::Vector3d accel_mean = Eigen::Vector3d::Zero();
+  double gyro_spread = 0.0;   ///< standard deviation, largest axis [rad/s]
+  double accel_spread = 0.0;  ///< [m/s^2]
+};
+
+/// Mean angular rate over an interval.
+struct MeanRate {
+  Eigen::Vector3d gyro_B = Eigen::Vector3d::Zero();  ///< [rad/s]
+  double noise_factor = 1.0;                         ///< the largest of the samples'
+};
+
+/// Ring of fixed capacity; the oldest sample makes room.
+class ImuBuffer {
+ public:
+  explicit ImuBuffer(std::size_t capacity) : samples_(capacity), noise_(capacity) {}
+
+  void push(const ImuSample& sample, const ImuNoiseFactors& noise = {});
+  void clear() { size_ = 0; }
+  /// Puts other values in place of the newest sample, under the same stamp, with the usual noise.
+  void correct_newest(const Eigen::Vector3d& gyro_B, const Eigen::Vector3d& accel_B);
+  /// The `count` newest samples have at least this noise.
+  void raise_newest_noise(std::size_t count, const ImuNoiseFactors& noise);
+
+  [[nodiscard]] bool empty() const { return size_ == 0; }
+  [[nodiscard]] std::size_t size() const { return size_; }
+  /// Oldest first.
+  [[nodiscard]] const ImuSample& operator[](std::size_t i) const { return samples_[slot(i)]; }
+  [[nodiscard]] const ImuSample& newest() const { return (*this)[size_ - 1]; }
+
+  /// Samples with from_ns <= t <= to_ns.
+  [[nodiscard]] ImuStatistics statistics(TimeNs from_ns, TimeNs to_ns) const;
+
+  /// From `from_ns` to `to_ns`, which is later.
+  [[nodiscard]] MeanRate mean_rate(TimeNs from_ns, TimeNs to_ns) const;
+
+  /// Calls f(gyro_B, accel_B, dt) for consecutive pieces of [from_ns, to_ns], with the mean over each piece of the
+  /// samples interpolated linearly; or f(gyro_B, accel_B, dt, noise) with the larger factors of the samples at both
+  /// ends. Before the first and after the last sample their values are held.
+  template <typename Function>
+  void for_each_piece(TimeNs from_ns, TimeNs to_ns, const Function& f) const {
+    if (empty()) return;
+    std::size_t next = first_after(from_ns);
+    ImuSample start = interpolate(next, from_ns);
+    while (start.t_ns < to_ns) {
+      const ImuSample end = next < size_ && (*this)[next].t_ns <= to_ns ? (*this)[next] : interpolate(next, to_ns);
+      const Eigen::Vector3d gyro_B = 0.5 * (start.gyro_B + end.gyro_B);
+      const Eigen::Vector3d accel_B = 0.5 * (start.accel_B + end.accel_B);
+      const double dt = seconds_between(start.t_ns, end.t_ns);
+      if constexpr (std::is_invocable_v<Function, Eigen::Vector3d, Eigen::Vector3d, double, ImuNoiseFactors>) {
+        f(gyro_B, accel_B, dt, noise_around(next));
+      } else {
+        f(gyro_B, accel_B, dt);
+      }
+      start = end;
+      ++next;
+    }
+  }
+
+ private:
+  /// Index of the first sample later than t_ns, or size().
+  [[nodiscard]] std::size_t first_after(TimeNs t_ns) const;
+  /// The value at t_ns, which lies between samples next - 1 and next.
+  [[nodiscard]] ImuSample interpolate(std::size_t next, TimeNs t_ns) const;
+
+  /// Of the samples before and at `next`, the larger.
+  [[nodiscard]] ImuNoiseFactors noise_around(std::size_t next) const;
+  [[nodiscard]] std::size_t slot(std::size_t i) const { return (first_ + i) % samples_.size(); }
+
+  std::vector<ImuSample> samples_;
+  std::vector<ImuNoiseFactors> noise_;  // of each
+  std::size_t first_ = 0;
+  std::size_t size_ = 0;
+};
+
+}  // namespace ear

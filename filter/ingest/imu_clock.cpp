@@ -1,0 +1,123 @@
+#include "filter/ingest/imu_clock.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "filter/ingest/clock_jump.h"
+#include "filter/ingest/stamp_guard.h"
+
+namespace ear {
+namespace {
+
+constexpr std::size_t kCapacity = 512;
+constexpr std::size_t kMostWaiting = 256;  // samples: 0.25 s at 1 kHz
+constexpr double kLongestWait = 0.25;      // [s]
+constexpr double kShare = 0.5;             // of the jump: readings that are off by less did not jump
+constexpr int kVotes = 2;                  // readings, for a verdict
+constexpr std::size_t kFewest = 3;         // samples after the jump: one false stamp is none
+constexpr double kReview = 1.0;            // [s] in which a verdict may be undone,
+constexpr int kContradictions = 8;         // by so many readings in a row
+constexpr double kMemory = 100.0;          // samples, readings
+
+}  // namespace
+
+ImuClock::ImuClock() : samples_(kCapacity) {}
+
+bool ImuClock::jumps(double step) const { return interval_ > 0.0 && is_clock_jump(step - interval_); }
+
+/// Can the other sensors tell whose jump it is? Not if they measured meanwhile what the samples leave out.
+bool ImuClock::others_tell(double step) const {
+  bool any = false;
+  for (const Other& other : others_) {
+    if (!other.before_ns) continue;
+    any = true;
+    if (step > 0.0 && seconds_between(*other.before_ns, *other.newest_ns) > kShare * step) return false;
+  }
+  return any;
+}
+
+void ImuClock::follow(TimeNs driver_ns) {
+  if (last_ns_) {
+    const double step = seconds_between(*last_ns_, driver_ns);
+    if (interval_ == 0.0 && step > 0.0) interval_ = std::min(step, kClockJump);
+    if (!jumps(step)) interval_ += (step - interval_) / kMemory;
+  }
+  last_ns_ = driver_ns;
+  for (Other& other : others_) other.before_ns = other.newest_ns;
+  if (corrected_ns_ && seconds_between(*corrected_ns_, driver_ns) > kReview) corrected_ns_.reset();
+}
+
+void ImuClock::add(const ImuSample& sample) {
+  if (samples_.full()) return;  // nobody asked for them
+  if (!is_time(sample.t_ns)) {  // for the input guard to refuse
+    samples_.push(sample);
+    return;
+  }
+  if (waiting_) {
+    const double step = seconds_between(samples_.back().t_ns, sample.t_ns);
+    const bool follows = step > 0.0 && !jumps(step);
+    const bool long_enough =
+        samples_.size() >= kMostWaiting || static_cast<double>(samples_.size()) * interval_ > kLongestWait;
+    if (!follows || long_enough) settle(false);
+  } else if (last_ns_) {
+    const double step = seconds_between(*last_ns_, sample.t_ns);
+    if (jumps(step) && others_tell(step)) {
+      waiting_ = true;
+      jump_ = step - interval_;
+      votes_ = 0;
+    }
+  }
+  samples_.push(sample);
+  if (!waiting_) follow(sample.t_ns);
+}
+
+void ImuClock::observe(Stream stream, TimeNs stamp_ns) {
+  if (!is_time(stamp_ns)) return;
+  Other& other = others_[static_cast<std::size_t>(stream)];
+  if (waiting_ && other.before_ns) {
+    const double passed = static_cast<double>(samples_.size()) * interval_;
+    const double measured = seconds_between(*other.before_ns, stamp_ns);
+    votes_ += std::abs(measured - passed) < kShare * std::abs(jump_) ? 1 : -1;
+    const bool enough = samples_.size() >= kFewest || votes_ < 0;
+    if (std::abs(votes_) >= kVotes && enough) settle(votes_ > 0);
+  }
+  if (!waiting_ && last_ns_) review(other, stamp_ns);
+  other.newest_ns = stamp_ns;
+}
+
+void ImuClock::settle(bool own_clock) {
+  waiting_ = false;
+  if (own_clock) {
+    shift_ns_ += std::llround(1e9 * jump_);
+    corrected_ns_ = samples_.back().t_ns;
+    contradictions_ = 0;
+    ++corrected_;
+  }
+  follow(samples_.back().t_ns);
+}
+
+/// Do the others' stamps keep their usual distance? Where, after a verdict, they turn out to have jumped as well, it is
+/// undone.
+void ImuClock::review(Other& other, TimeNs stamp_ns) {
+  const double ahead = seconds_between(*last_ns_ - shift_ns_, stamp_ns);
+  if (!corrected_ns_) {
+    other.ahead += (other.newest_ns ? 1.0 / kMemory : 1.0) * (ahead - other.ahead);
+    return;
+  }
+  const double jumped = (ahead - other.ahead) / jump_;
+  contradictions_ = jumped > kShare && jumped < 1.0 + kShare ? contradictions_ + 1 : 0;
+  if (contradictions_ < kContradictions) return;
+  shift_ns_ -= std::llround(1e9 * jump_);
+  corrected_ns_.reset();
+  --corrected_;
+}
+
+std::optional<ImuSample> ImuClock::next() {
+  if (waiting_ || samples_.empty()) return std::nullopt;
+  ImuSample sample = samples_.front();
+  samples_.pop();
+  if (is_time(sample.t_ns)) sample.t_ns -= shift_ns_;
+  return sample;
+}
+
+}  // namespace ear

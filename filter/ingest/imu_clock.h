@@ -1,0 +1,68 @@
+// Whose clock is it that jumps? Where the stamps of the inertial samples jump and those of the other sensors, as they
+// come in, do not, it is the inertial clock's fault: its stamps are moved back onto the common clock. Where the others
+// jump as well, or went on meanwhile, samples are missing, or time is another for all. docs/filter.md, section 14.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+
+#include "ear/types.h"
+#include "filter/ingest/ring.h"
+
+namespace ear {
+
+class ImuClock {
+ public:
+  enum class Stream : std::uint8_t { encoder, laser, camera };
+
+  ImuClock();
+
+  /// A sample as its driver stamped it, in the order of arrival. After a jump samples wait until the other sensors have
+  /// told whose it is, for a quarter of a second at most.
+  void add(const ImuSample& sample);
+  /// Another sensor's reading came in.
+  void observe(Stream stream, TimeNs stamp_ns);
+
+  /// The next sample that does not wait, by the common clock. To be asked until there is none, after add() and
+  /// observe().
+  [[nodiscard]] std::optional<ImuSample> next();
+
+  [[nodiscard]] bool waiting() const { return waiting_; }
+  /// Was a jump taken out since the last call?
+  [[nodiscard]] bool take_correction() {
+    const bool any = corrected_ != reported_;
+    reported_ = corrected_;
+    return any;
+  }
+  [[nodiscard]] int jumps_corrected() const { return corrected_; }
+
+ private:
+  /// What is known of another stream; stamps [ns], by its own clock.
+  struct Other {
+    std::optional<TimeNs> newest_ns;
+    std::optional<TimeNs> before_ns;  ///< the newest when the last inertial sample came that followed the one before
+    double ahead = 0.0;               ///< [s] of the inertial samples, usually
+  };
+
+  [[nodiscard]] bool jumps(double step) const;
+  [[nodiscard]] bool others_tell(double step) const;
+  void follow(TimeNs driver_ns);
+  void settle(bool own_clock);
+  void review(Other& other, TimeNs stamp_ns);
+
+  std::array<Other, 3> others_;
+  Ring<ImuSample> samples_;             ///< not fetched yet, by the driver's clock
+  bool waiting_ = false;                ///< for a verdict
+  double jump_ = 0.0;                   ///< [s] what it is about
+  int votes_ = 0;                       ///< readings for a jump of the inertial clock, less those against
+  TimeNs shift_ns_ = 0;                 ///< driver's clock less the common one
+  std::optional<TimeNs> last_ns_;       ///< the newest sample that followed the one before, by the driver's clock
+  double interval_ = 0.0;               ///< [s] usual
+  std::optional<TimeNs> corrected_ns_;  ///< when a jump was last taken out; until that is certain
+  int contradictions_ = 0;              ///< readings in a row against it
+  int corrected_ = 0;
+  int reported_ = 0;  ///< of these
+};
+
+}  // namespace ear

@@ -1,0 +1,45 @@
+#include "filter/ingest/imu_interruption.h"
+
+#include <cmath>
+
+namespace ear {
+namespace {
+
+constexpr double kSettles = 0.07;    // [s] chosen: two frames at 30 Hz after a bridge
+constexpr double kImageSoon = 0.25;  // [s] chosen: so long readings wait for an image
+
+}  // namespace
+
+void ImuInterruption::add_gap(TimeNs from_ns, TimeNs to_ns, double unseen) { gap_ = Gap{from_ns, to_ns, unseen}; }
+
+void ImuInterruption::add_uncertain(TimeNs t_ns) {
+  if (!uncertain_since_ns_) uncertain_since_ns_ = t_ns;
+}
+
+std::optional<TimeNs> ImuInterruption::gap_from() const { return gap_ ? std::optional(gap_->from_ns) : std::nullopt; }
+
+/// What the vehicle did in the gap, it did all the time: standard deviations grow with the time.
+double ImuInterruption::take_unseen(TimeNs t_ns) {
+  if (!gap_ || t_ns <= gap_->from_ns) return 0.0;
+  const bool over = t_ns >= gap_->to_ns;
+  const double share = over ? 1.0 : seconds_between(gap_->from_ns, t_ns) / seconds_between(gap_->from_ns, gap_->to_ns);
+  const double unseen = gap_->unseen * std::sqrt(share * share - gap_->counted * gap_->counted);
+  gap_->counted = share;
+  if (over) gap_.reset();
+  add_uncertain(t_ns);
+  return unseen;
+}
+
+bool ImuInterruption::take_uncertain() {
+  const bool uncertain = uncertain_since_ns_.has_value();
+  uncertain_since_ns_.reset();
+  return uncertain;
+}
+
+bool ImuInterruption::waits_for_images(TimeNs t_ns) const {
+  const auto since = [t_ns](TimeNs from_ns) { return seconds_between(from_ns, t_ns); };
+  return (gap_ && since(gap_->from_ns) > 0.0) || (uncertain_since_ns_ && since(*uncertain_since_ns_) < kImageSoon) ||
+         (bridged_ns_ && since(*bridged_ns_) < kSettles);
+}
+
+}  // namespace ear

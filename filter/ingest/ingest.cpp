@@ -1,0 +1,139 @@
+#include "filter/ingest/ingest.h"
+
+#include <utility>
+
+namespace ear {
+namespace {
+
+constexpr std::size_t kImuCapacity = 4096;     // samples, chosen: 20 s at 200 Hz, 4 s at 1 kHz
+constexpr std::size_t kReadingCapacity = 512;  // chosen: readings that wait for the state to pass them
+constexpr double kStartWindow = 2.0;           // [s] chosen: of readings kept for a start while rolling
+constexpr double kHeldSample = 0.04;           // [s] chosen: so far the newest inertial sample stands for the next one
+
+/// Makes room in a full queue, and forgets what is too old for a start.
+template <typename T, typename TimeOf>
+void drop_old(Ring<T>& readings, TimeNs newest_ns, const TimeOf& time_of) {
+  const auto too_old = [&] { return seconds_between(time_of(readings.front()), newest_ns) > kStartWindow; };
+  while (!readings.empty() && (readings.full() || too_old())) readings.pop();
+}
+
+}  // namespace
+
+Ingest::Ingest(const FilterConfig& config, const Calibration& calibration)
+    : config_(config),
+      calibration_(calibration),
+      guard_(calibration, config.max_imu_gap),
+      impact_guard_(config.impact, calibration.imu),
+      imu_(kImuCapacity),
+      increments_(kReadingCapacity),
+      ranges_(kReadingCapacity) {
+  if (calibration.encoder) encoder_.emplace(*calibration.encoder);
+}
+
+void Ingest::restart() {
+  Ingest fresh(config_, calibration_);
+  fresh.imu_clock_ = std::move(imu_clock_);
+  fresh.encoder_clock_ = encoder_clock_;
+  fresh.camera_clock_ = camera_clock_;
+  fresh.guard_ = std::move(guard_);
+  fresh.guard_.restart();
+  *this = std::move(fresh);
+}
+
+ImuVerdict Ingest::judge(const ImuSample& sample) {
+  const ImuVerdict verdict = guard_.judge(sample);
+  if (verdict.accepted && !verdict.begins_anew && !imu_.empty() && verdict.unseen > config_.max_imu_gap) {
+    interruption_.add_gap(imu_.newest().t_ns, sample.t_ns, verdict.unseen);
+  }
+  return verdict;
+}
+
+ImuSpike Ingest::store(const ImuSample& sample) {
+  ImuSpike spike;
+  if (imu_.size() >= 2) {
+    const ImuSample& before = imu_[imu_.size() - 2];
+    if (seconds_between(before.t_ns, sample.t_ns) <= config_.max_imu_gap)
+      spike = find_spike(before, imu_.newest(), sample);
+    if (spike.any()) {
+      imu_.correct_newest(0.5 * (before.gyro_B + sample.gyro_B), 0.5 * (before.accel_B + sample.accel_B));
+      guard_.count_spike();
+    }
+  }
+  const ImuNoiseFactors noise = impact_guard_.add(sample);
+  imu_.raise_newest_noise(static_cast<std::size_t>(impact_guard_.clipped_before()), noise);
+  imu_.push(sample, noise);
+  return spike;
+}
+
+Ingest::Encoders Ingest::take(const EncoderSample& given, std::optional<TimeNs> state_ns) {
+  Encoders taken;
+  taken.sample = given;
+  const std::optional<TimeNs> stamp = encoder_clock_.correct(given.t_ns, now());
+  if (stamp) taken.sample.t_ns = *stamp;
+  taken.verdict = stamp ? guard_.judge(taken.sample, state_ns, *encoder_) : guard_.refuse_encoder();
+  if (taken.verdict == Verdict::accepted) taken.increment = encoder_->add(taken.sample);
+  return taken;
+}
+
+std::optional<TimeNs> Ingest::imu_due() const {
+  return imu_.size() == kImuCapacity ? std::optional(imu_[kImuCapacity / 2].t_ns) : std::nullopt;
+}
+
+std::optional<TimeNs> Ingest::due_before(const WheelIncrement& increment, bool has_state) {
+  if (has_state) return increments_.full() ? std::optional(increments_.front().to_ns) : std::nullopt;
+  drop_old(increments_, increment.to_ns, [](const WheelIncrement& old) { return old.from_ns; });
+  return std::nullopt;
+}
+
+std::optional<TimeNs> Ingest::due_before(const LaserSample& sample, bool has_state) {
+  if (has_state) return ranges_.full() ? std::optional(ranges_.front().t_ns) : std::nullopt;
+  drop_old(ranges_, sample.t_ns, [](const BeamRanges& old) { return old.t_ns; });
+  return std::nullopt;
+}
+
+std::optional<Measurement> Ingest::next(TimeNs t_ns) {
+  const bool wheels_next =
+      !increments_.empty() && (ranges_.empty() || middle_of(increments_.front()) < ranges_.front().t_ns);
+  if (!wheels_next && ranges_.empty()) return std::nullopt;
+  Measurement measurement;
+  measurement.t_ns = wheels_next ? middle_of(increments_.front()) : ranges_.front().t_ns;
+  if (measurement.t_ns > t_ns) return std::nullopt;
+  if (wheels_next) {
+    measurement.increment = passed_increment_ = increments_.front();
+    increments_.pop();
+  } else {
+    measurement.ranges = ranges_.front();
+    ranges_.pop();
+  }
+  return measurement;
+}
+
+void Ingest::drop_before(TimeNs t_ns) {
+  while (!increments_.empty() && increments_.front().from_ns < t_ns) increments_.pop();
+  while (!ranges_.empty() && ranges_.front().t_ns < t_ns) ranges_.pop();
+}
+
+void Ingest::drop_readings() {
+  increments_.clear();
+  ranges_.clear();
+  passed_increment_.reset();
+}
+
+/// The newest inertial sample, where that gives the time: not while its clock is in question.
+std::optional<TimeNs> Ingest::now() const {
+  if (imu_.empty() || imu_clock_.waiting() || guard_.refuses_imu()) return std::nullopt;
+  return imu_.newest().t_ns;
+}
+
+bool Ingest::covers(TimeNs imu_time_ns) const {
+  return !imu_.empty() && seconds_between(imu_.newest().t_ns, imu_time_ns) < kHeldSample;
+}
+
+InputCounts Ingest::counts() const {
+  InputCounts counts = guard_.counts();
+  counts.clock_jumps =
+      static_cast<std::uint64_t>(imu_clock_.jumps_corrected() + encoder_clock_.jumps() + camera_clock_.jumps());
+  return counts;
+}
+
+}  // namespace ear

@@ -1,0 +1,99 @@
+// Samples in: one clock a stream, plausibility, buffers, and the quality of the inertial samples. What comes out can be
+// used. A sample that is late, early, false or missing is dealt with here. docs/filter.md, "What is refused".
+#pragma once
+
+#include <optional>
+
+#include "ear/calibration.h"
+#include "ear/estimate.h"
+#include "ear/filter_config.h"
+#include "ear/types.h"
+#include "filter/ingest/beam_ranges.h"
+#include "filter/ingest/impact_guard.h"
+#include "filter/ingest/imu_buffer.h"
+#include "filter/ingest/imu_clock.h"
+#include "filter/ingest/imu_interruption.h"
+#include "filter/ingest/imu_spike.h"
+#include "filter/ingest/input_guard.h"
+#include "filter/ingest/ring.h"
+#include "filter/ingest/stream_clock.h"
+#include "filter/ingest/wheel_increment.h"
+
+namespace ear {
+
+/// One reading of wheels or lasers whose time has come: exactly one of the two.
+struct Measurement {
+  TimeNs t_ns = 0;  ///< the middle of the increment, or the time of the ranges
+  std::optional<WheelIncrement> increment;
+  BeamRanges ranges;
+};
+
+class Ingest {
+ public:
+  Ingest(const FilterConfig& config, const Calibration& calibration);
+
+  /// Inertial samples go in here as their drivers stamped them, and stamps of the other streams as they come; what
+  /// comes out goes to judge() and store().
+  [[nodiscard]] ImuClock& imu_clock() { return imu_clock_; }
+  [[nodiscard]] ImuVerdict judge(const ImuSample& sample);
+  /// Into the buffer, with what it shows about the sample before.
+  ImuSpike store(const ImuSample& sample);
+
+  /// A reading, by the common clock and with the wheels' increment since the one before.
+  struct Encoders {
+    EncoderSample sample;
+    Verdict verdict = Verdict::mistimed;
+    std::optional<WheelIncrement> increment;
+  };
+  /// `state_ns`: time of the state, if there is one.
+  [[nodiscard]] Encoders take(const EncoderSample& sample, std::optional<TimeNs> state_ns);
+  [[nodiscard]] Verdict judge(const LaserSample& sample, std::optional<TimeNs> state_ns) {
+    return guard_.judge(sample, state_ns);
+  }
+  /// A camera's stamp by the common clock; nothing while that is not known.
+  [[nodiscard]] std::optional<TimeNs> camera_stamp(TimeNs stamp_ns) { return camera_clock_.correct(stamp_ns, now()); }
+  [[nodiscard]] const FeatureFrame& plausible(const FeatureFrame& frame) { return guard_.plausible(frame); }
+
+  /// If the buffer of inertial samples is full: the time up to which the state has to go before the next one.
+  [[nodiscard]] std::optional<TimeNs> imu_due() const;
+  /// Readings wait here until the state passes them. If the queue is full: the time up to which the state has to go
+  /// first. Without a state, the oldest make room.
+  [[nodiscard]] std::optional<TimeNs> due_before(const WheelIncrement& increment, bool has_state);
+  [[nodiscard]] std::optional<TimeNs> due_before(const LaserSample& sample, bool has_state);
+  void push(const WheelIncrement& increment) { increments_.push(increment); }
+  void push(const LaserSample& sample) { ranges_.push(BeamRanges(sample)); }
+  /// The next one that is not later than `t_ns`, in time order.
+  [[nodiscard]] std::optional<Measurement> next(TimeNs t_ns);
+  /// All that are earlier.
+  void drop_before(TimeNs t_ns);
+  void drop_readings();
+
+  /// Nothing is known of the samples before; clocks and counts go on.
+  void restart();
+
+  /// Are there inertial samples (nearly) up to this time?
+  [[nodiscard]] bool covers(TimeNs imu_time_ns) const;
+  [[nodiscard]] WheelIncrements increments() const { return {passed_increment_, increments_}; }
+  [[nodiscard]] const Ring<WheelIncrement>& waiting_increments() const { return increments_; }
+  [[nodiscard]] const ImuBuffer& imu() const { return imu_; }
+  [[nodiscard]] ImuInterruption& interruption() { return interruption_; }
+  [[nodiscard]] InputCounts counts() const;
+
+ private:
+  [[nodiscard]] std::optional<TimeNs> now() const;
+
+  FilterConfig config_;
+  Calibration calibration_;
+  ImuClock imu_clock_;
+  StreamClock encoder_clock_, camera_clock_;
+  InputGuard guard_;
+  ImpactGuard impact_guard_;
+  ImuBuffer imu_;
+  ImuInterruption interruption_;
+  std::optional<EncoderReader> encoder_;
+  Ring<WheelIncrement> increments_;                 ///< not yet passed by the state
+  Ring<BeamRanges> ranges_;                         ///< the same
+  std::optional<WheelIncrement> passed_increment_;  ///< the last one that was
+};
+
+}  // namespace ear

@@ -1,0 +1,167 @@
+#include "filter/ingest/input_guard.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "filter/ingest/capacity.h"
+
+namespace ear {
+namespace {
+
+constexpr double kLargestRate = 100.0;    // [rad/s] more than any gyroscope measures
+constexpr double kLargestForce = 1000.0;  // [m/s^2] the same of an accelerometer: 100 g
+constexpr double kLargestTurn = 500.0;    // [rad/s] of a wheel: 25 m/s with a radius of 5 cm
+constexpr double kStampJitter = 0.01;     // [s] by which a reading may have waited for its stamp
+constexpr double kLargestRange = 1000.0;  // [m] of a laser: more is a wrong unit
+constexpr double kWidestView = 100.0;     // tan of the angle off the axis: nothing is seen at 89.4 deg
+constexpr std::int64_t kLargestCount = std::int64_t{1} << 60;
+constexpr double kStreamGap = 0.25;  // [s] without readings of a sensor other than the IMU: a gap
+constexpr double kFarAhead = 0.5;    // [s] ahead of the inertial samples: a false stamp
+constexpr double kTooLate = 0.1;     // [s] behind the state: a reading that comes so late is not used
+constexpr double kLostAfter = 2.0;   // [s] without inertial samples: where the vehicle is now nobody knows
+
+}  // namespace
+
+InputGuard::InputGuard(const Calibration& calibration, double max_imu_gap)
+    : max_imu_gap_(max_imu_gap), beam_count_(calibration.lasers ? calibration.lasers->beams.size() : 0) {
+  ids_.reserve(kFeatureCapacity);
+  plausible_frame_.features.reserve(kFeatureCapacity);
+}
+
+ImuVerdict InputGuard::judge(const ImuSample& sample) {
+  StreamCounts& counts = counts_.imu;
+  ImuVerdict verdict;
+  if (!sample.gyro_B.allFinite() || !sample.accel_B.allFinite()) {
+    ++counts.not_finite;
+    return verdict;
+  }
+  if (!is_time(sample.t_ns) || sample.gyro_B.cwiseAbs().maxCoeff() > kLargestRate ||
+      sample.accel_B.cwiseAbs().maxCoeff() > kLargestForce) {
+    ++counts.implausible;
+    return verdict;
+  }
+  const Stamp stamp = imu_stamps_.judge(sample.t_ns);
+  if (stamp == Stamp::not_later || stamp == Stamp::far_ahead) {
+    ++(stamp == Stamp::not_later ? counts.not_later : counts.far_ahead);
+    if (stamp == Stamp::not_later) {
+      if (!refused_from_ns_) refused_from_ns_ = sample.t_ns;
+      refused_to_ns_ = sample.t_ns;
+    }
+    return verdict;
+  }
+  ++counts.accepted;
+  const double step = imu_ns_ ? seconds_between(*imu_ns_, sample.t_ns) : 0.0;
+  if (step > max_imu_gap_) {
+    ++counts.gaps;
+    verdict.unseen = step;
+  }
+  if (refused_from_ns_) verdict.unseen = std::max(verdict.unseen, seconds_between(*refused_from_ns_, refused_to_ns_));
+  refused_from_ns_.reset();
+  verdict.accepted = true;
+  verdict.begins_anew = stamp == Stamp::set_back || step > kLostAfter;
+  if (stamp == Stamp::set_back) verdict.clock_shift = imu_stamps_.clock_shift();
+  imu_ns_ = sample.t_ns;
+  return verdict;
+}
+
+/// Is a reading of another sensor later than the one before, and near the inertial samples? Where the one before lies
+/// far ahead of these, its own stamp was false, and it does not count.
+bool InputGuard::takes_stamp(TimeNs t_ns, std::optional<TimeNs> state_ns, std::optional<TimeNs>& last_ns,
+                             StreamCounts& counts) const {
+  const auto far_ahead = [this](TimeNs stamp_ns) { return imu_ns_ && seconds_between(*imu_ns_, stamp_ns) > kFarAhead; };
+  if (last_ns && far_ahead(*last_ns)) last_ns.reset();
+  if (far_ahead(t_ns)) {
+    ++counts.far_ahead;
+  } else if (last_ns && t_ns <= *last_ns) {
+    ++counts.not_later;
+  } else if (state_ns && seconds_between(t_ns, *state_ns) > kTooLate) {
+    ++counts.too_late;
+  } else {
+    if (last_ns && seconds_between(*last_ns, t_ns) > kStreamGap) ++counts.gaps;
+    last_ns = t_ns;
+    return true;
+  }
+  return false;
+}
+
+Verdict InputGuard::judge(const EncoderSample& sample, std::optional<TimeNs> state_ns, EncoderReader& reader) {
+  StreamCounts& counts = counts_.encoder;
+  const auto counter = [](std::int64_t n) { return n > -kLargestCount && n < kLargestCount; };
+  if (!is_time(sample.t_ns) || !counter(sample.left_count) || !counter(sample.right_count)) {
+    ++counts.implausible;
+    return Verdict::impossible;
+  }
+  if (!takes_stamp(sample.t_ns, state_ns, last_encoder_ns_, counts)) return Verdict::mistimed;
+  if (reader.any()) {
+    const double dt = seconds_between(reader.last_ns(), sample.t_ns);
+    const bool gap = dt <= 0.0 || dt > kStreamGap;  // not later than a reading whose stamp was false
+    if (gap) {
+      reader.clear();
+    } else if (reader.largest_angle(sample) > kLargestTurn * (dt + kStampJitter)) {  // or the counter was set anew
+      reader.clear();
+      static_cast<void>(reader.add(sample));
+      ++counts.implausible;
+      return Verdict::impossible;
+    }
+  }
+  ++counts.accepted;
+  return Verdict::accepted;
+}
+
+Verdict InputGuard::refuse_encoder() {
+  ++counts_.encoder.far_ahead;
+  return Verdict::impossible;
+}
+
+Verdict InputGuard::judge(const LaserSample& sample, std::optional<TimeNs> state_ns) {
+  StreamCounts& counts = counts_.laser;
+  const auto any = [&sample](const auto& condition) {
+    return std::any_of(sample.range.begin(), sample.range.end(), condition);
+  };
+  if (any([](double range) { return std::isinf(range); })) {
+    ++counts.not_finite;
+    return Verdict::impossible;
+  }
+  if (!is_time(sample.t_ns) || sample.range.size() != beam_count_ ||
+      any([](double range) { return range < 0.0 || range > kLargestRange; })) {
+    ++counts.implausible;
+    return Verdict::impossible;
+  }
+  if (!takes_stamp(sample.t_ns, state_ns, last_laser_ns_, counts)) return Verdict::mistimed;
+  ++counts.accepted;
+  return Verdict::accepted;
+}
+
+const FeatureFrame& InputGuard::plausible(const FeatureFrame& frame) {
+  const auto visible = [](const Eigen::Vector2d& uv) {  // false for NaN
+    return std::abs(uv.x()) < kWidestView && std::abs(uv.y()) < kWidestView;
+  };
+  const auto possible = [&](const FeatureObservation& f) {
+    return visible(f.left) && (!f.has_right || visible(f.right));
+  };
+  ids_.clear();
+  for (const FeatureObservation& feature : frame.features) ids_.push_back(feature.id);
+  std::sort(ids_.begin(), ids_.end());
+  const bool twice = std::adjacent_find(ids_.begin(), ids_.end()) != ids_.end();
+  if (!twice && std::all_of(frame.features.begin(), frame.features.end(), possible)) return frame;
+
+  plausible_frame_.t_ns = frame.t_ns;
+  plausible_frame_.right_skipped = frame.right_skipped;
+  plausible_frame_.features.clear();
+  const auto copies = [this](std::uint64_t id) {
+    const auto range = std::equal_range(ids_.begin(), ids_.end(), id);
+    return range.second - range.first;
+  };
+  for (const FeatureObservation& feature : frame.features) {
+    if (possible(feature) && copies(feature.id) == 1) plausible_frame_.features.push_back(feature);
+  }
+  counts_.features_rejected += frame.features.size() - plausible_frame_.features.size();
+  return plausible_frame_;
+}
+
+void InputGuard::restart() {
+  last_encoder_ns_.reset();
+  last_laser_ns_.reset();
+}
+
+}  // namespace ear

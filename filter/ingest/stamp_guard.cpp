@@ -1,0 +1,34 @@
+#include "filter/ingest/stamp_guard.h"
+
+namespace ear {
+namespace {
+
+constexpr double kLongestStep = 0.25;  // [s] ahead that needs no confirmation
+constexpr int kConfirmed = 3;          // stamps in a row after a longer one
+constexpr double kSetBack = 1.0;       // [s] of stamps in a row before a clock that runs behind is believed
+
+}  // namespace
+
+Stamp StampGuard::judge(TimeNs t_ns) {
+  const double step = seconds_between(last_ns_, t_ns);
+  if (!any_ || (t_ns > last_ns_ && step <= kLongestStep)) {
+    any_ = true;
+    last_ns_ = t_ns;
+    run_ = 0;
+    return Stamp::next;
+  }
+  const bool follows = run_ > 0 && t_ns > run_to_ns_ && seconds_between(run_to_ns_, t_ns) <= kLongestStep;
+  run_ = follows ? run_ + 1 : 1;
+  if (!follows) run_from_ns_ = t_ns;
+  run_to_ns_ = t_ns;
+
+  const bool ahead = t_ns > last_ns_;
+  const bool confirmed = ahead ? run_ >= kConfirmed : seconds_between(run_from_ns_, t_ns) >= kSetBack;
+  if (!confirmed) return ahead ? Stamp::far_ahead : Stamp::not_later;
+  clock_shift_ = ahead ? 0 : run_from_ns_ - last_ns_;
+  last_ns_ = t_ns;
+  run_ = 0;
+  return ahead ? Stamp::after_gap : Stamp::set_back;
+}
+
+}  // namespace ear

@@ -1,0 +1,60 @@
+#include "filter/ingest/stream_clock.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "filter/ingest/clock_jump.h"
+
+namespace ear {
+namespace {
+
+constexpr int kToKnow = 20;        // readings until it is known how they usually come
+constexpr double kMemory = 100.0;  // readings
+constexpr double kShare = 0.5;     // of a jump, that its two measures may differ by
+constexpr double kPause = 5.0;     // intervals; after longer ones steps tell nothing
+
+}  // namespace
+
+/// By how much a stamp is ahead of where readings that come at that time should be; 0 if that is no jump [s].
+double StreamClock::jump_at(TimeNs t_ns, TimeNs now_ns) const {
+  const double passed = seconds_between(*last_now_ns_, now_ns);
+  if (passed > kPause * interval_) return 0.0;
+  const double intervals = std::max(1.0, std::round(passed / interval_));
+  const double jump = seconds_between(*last_ns_, t_ns) - intervals * interval_;
+  const double ahead = seconds_between(now_ns, t_ns) - ahead_;
+  return is_clock_jump(jump) && std::abs(ahead - jump) < kShare * std::abs(jump) ? jump : 0.0;
+}
+
+void StreamClock::follow(TimeNs t_ns, std::optional<TimeNs> now_ns) {
+  if (now_ns && last_ns_ && last_now_ns_) {
+    const double step = seconds_between(*last_ns_, t_ns);
+    const double share = std::max(1.0 / kMemory, 1.0 / (count_ + 1));
+    if (step > 0.0 && (count_ < kToKnow || std::abs(step - interval_) < kClockJump))
+      interval_ += share * (step - interval_);
+    ahead_ += share * (seconds_between(*now_ns, t_ns) - ahead_);
+    ++count_;
+  }
+  last_ns_ = t_ns;
+  last_now_ns_ = now_ns;
+  suspect_ns_.reset();
+}
+
+std::optional<TimeNs> StreamClock::correct(TimeNs stamp_ns, std::optional<TimeNs> now_ns) {
+  TimeNs t_ns = stamp_ns - shift_ns_;
+  if (count_ >= kToKnow && now_ns && last_ns_ && last_now_ns_) {
+    const double jump = jump_at(t_ns, *now_ns);
+    if (jump != 0.0) {
+      const bool follows = suspect_ns_ && std::abs(seconds_between(*suspect_ns_, t_ns) - interval_) < kClockJump;
+      suspect_ns_ = t_ns;
+      if (!follows) return std::nullopt;
+      const auto jump_ns = static_cast<TimeNs>(std::llround(1e9 * jump));
+      shift_ns_ += jump_ns;
+      t_ns -= jump_ns;
+      ++jumps_;
+    }
+  }
+  follow(t_ns, now_ns);
+  return t_ns;
+}
+
+}  // namespace ear

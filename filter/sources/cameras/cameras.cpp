@@ -1,0 +1,146 @@
+#include "filter/sources/cameras/cameras.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "filter/ekf/initial_state.h"
+#include "filter/ekf/relative_motion.h"
+#include "filter/ingest/capacity.h"
+
+namespace ear {
+namespace {
+
+constexpr double kBridgeRotation = 2e-3;  // [rad] chosen: standard deviations with which two images show the motion:
+constexpr double kBridgePosition = 5e-3;  // [m] well above what the features will show later
+constexpr int kBridgeRows = 6;
+constexpr double kApparent = 3.0;          // standard deviations of the cameras' calibration that look like a turn
+constexpr double kOldImage = 0.5;          // [s] chosen: after which frames have little in common
+constexpr double kNoisy = 1.25;            // chosen: times the usual noise of a feature; less may be chance
+constexpr std::size_t kMaxCompared = 512;  // features of a frame whose motion is compared with other sensors
+
+}  // namespace
+
+Cameras::Cameras(const FilterConfig& config, const Calibration& calibration)
+    : config_(config),
+      count_(calibration.cameras.size()),
+      focal_px_(focal_length(calibration)),
+      tracks_(2 * kFeatureCapacity, static_cast<std::size_t>(config.window) + 1),
+      track_update_(config, focal_px_, count_),
+      window_(config, focal_px_),
+      frame_check_(config.feature_sigma_px / focal_px_, Gate(config.gate_probability, 2)),
+      displacement_(config.feature_sigma_px / focal_px_, kMaxCompared),
+      rows_(kBridgeRows, err::clone(config.window + 1)) {
+  last_features_.features.reserve(kFeatureCapacity);
+}
+
+void Cameras::measure_noise(const FeatureFrame& frame, const CameraState& cameras) {
+  noise_ = 1.0;
+  if (count_ < 2) return;
+  const double ratio = image_noise_.measure(frame, cameras) * focal_px_ / config_.feature_sigma_px;
+  if (ratio > kNoisy) noise_ = ratio;
+}
+
+Displacement Cameras::displacement(const FeatureFrame& frame, TimeNs t_ns, const ImuMotion& motion, const Ekf& ekf) {
+  if (ekf.state().imu.t_ns != compared_ns_) displacement_.clear();  // the frame before was not where the state is
+  compared_ns_ = t_ns;
+  const double bias =
+      motion.duration * motion.duration * ekf.covariance().matrix().diagonal().segment<3>(err::b_g).maxCoeff();
+  return displacement_.add(frame, ekf.state().camera, motion.R_BiBj, motion.rotation_variance + bias);
+}
+
+/// The body now, in the body at the last image.
+Pose Cameras::motion_since_image(const ImuState& x) const {
+  const Eigen::Matrix3d R_BW = last_->T_WB.R.transpose();
+  return {R_BW * x.R_WB, R_BW * (x.p_WB - last_->T_WB.p)};
+}
+
+bool Cameras::bridge(const FeatureFrame& frame, Ekf& ekf) {
+  const State& x = ekf.state();
+  if (!last_ || count_ < 2 || x.clones.empty()) return false;
+  const Pose moved = motion_since_image(x.imu);
+  StereoMotion start;
+  start.R_B0B1 = moved.R;
+  start.p_B0B1 = moved.p;
+  const std::optional<StereoMotion> motion =
+      stereo_motion(matches_.find(last_features_, frame), x.camera, start, config_.feature_sigma_px / focal_px_);
+  if (!motion) return false;
+  const int newest = static_cast<int>(x.clones.size()) - 1;
+  const RelativeMotionRows rows = linearize_relative_motion(x, newest, {motion->R_B0B1, motion->p_B0B1});
+  const Eigen::Matrix3d R_WB0 = x.clones.back().T_WB.R;
+  const Eigen::Matrix3d covariance =
+      R_WB0 * motion->covariance * R_WB0.transpose() + kBridgePosition * kBridgePosition * Eigen::Matrix3d::Identity();
+  const Eigen::LLT<Eigen::Matrix3d> llt(covariance);
+  auto H = rows_.topLeftCorner(kBridgeRows, err::clone(newest) + err::clone_size);
+  H.setZero();
+  H.topLeftCorner<3, err::imu_size>() = rows.H.topRows<3>() / kBridgeRotation;
+  H.topRightCorner<3, err::clone_size>() = rows.H_clone.topRows<3>() / kBridgeRotation;
+  H.bottomLeftCorner<3, err::imu_size>() = llt.matrixL().solve(rows.H.bottomRows<3>());
+  H.bottomRightCorner<3, err::clone_size>() = llt.matrixL().solve(rows.H_clone.bottomRows<3>());
+  Eigen::Matrix<double, kBridgeRows, 1> r;
+  r << rows.residual.head<3>() / kBridgeRotation, llt.matrixL().solve(rows.residual.tail<3>());
+  ekf.apply(H, 0, r, CameraUpdate::considered, true);
+  return true;
+}
+
+/// How fast the errors of the cameras' mounting and of their time offset make the vehicle seem to turn otherwise than
+/// the gyroscope measures, with the last image `dt` ago [rad/s].
+double Cameras::apparent_rate(double dt, const Ekf& ekf) const {
+  const auto P = ekf.covariance().matrix();
+  const double mounting = P.diagonal().segment<3>(err::camera).cwiseMax(0.0).maxCoeff();
+  const double offset = std::max(0.0, P(err::time_offset, err::time_offset));
+  const Eigen::Vector3d& rate_B = ekf.rate_B();
+  const double acceleration = (rate_B - last_->rate_B).norm() / dt;
+  return kApparent * std::sqrt(rate_B.squaredNorm() * mounting + acceleration * acceleration * offset);
+}
+
+FrameAgreement Cameras::compare(const FeatureFrame& frame, const Ekf& ekf) {
+  FrameAgreement agreement;
+  if (count_ < 2) return agreement;
+  const State& x = ekf.state();
+  const double dt = last_ ? seconds_between(last_->t_ns, frame.t_ns) : 0.0;
+  if (last_ && dt <= kOldImage) {
+    const Pose moved = motion_since_image(x.imu);
+    const double sigma_v = std::sqrt(ekf.covariance().matrix().diagonal().segment<3>(err::nu).maxCoeff());
+    agreement = frame_check_.compare(last_features_, frame, {moved.R, moved.p, dt * sigma_v}, x.camera, noise_);
+    agreement.apparent_rate = apparent_rate(dt, ekf);
+  }
+  agreement.noise = noise_;
+  agreement.behind = frame_check_.share_behind(frame, x.camera, noise_);
+  return agreement;
+}
+
+void Cameras::update(const FeatureFrame& frame, double weight, CameraUpdate calibration, Ekf& ekf, Records& records) {
+  ekf.clone(noise_ / weight);
+  tracks_.add(ekf.state().clones.back().frame, frame.features);
+  const std::optional<std::size_t> next = window_.to_marginalise(ekf.state(), tracks_);
+  track_update_.update(frame, next && *next == 0, calibration, tracks_, ekf, records);
+  window_.add_updates(records.statistics.features_used, ekf.state().imu.t_ns);
+  marginalise(next, ekf);
+  while (ekf.state().clones.size() > window_.size()) marginalise(0, ekf);  // the window has become smaller
+}
+
+void Cameras::clone_without_image(double weight, Ekf& ekf) {
+  ekf.clone(noise_ / weight);
+  marginalise(window_.to_marginalise(ekf.state(), tracks_), ekf);
+}
+
+void Cameras::marginalise(std::optional<std::size_t> clone, Ekf& ekf) {
+  if (!clone) return;
+  if (*clone == 0) window_.set_updated(ekf.state().imu.t_ns);  // by all that reached back to it
+  tracks_.forget_frame(ekf.state().clones[*clone].frame);
+  ekf.marginalise(*clone);
+}
+
+void Cameras::remember(const FeatureFrame& frame, const Ekf& ekf) {
+  const ImuState& x = ekf.state().imu;
+  last_ = LastImage{frame.t_ns, {x.R_WB, x.p_WB}, ekf.rate_B()};
+  last_features_ = frame;
+}
+
+void Cameras::reset() {
+  tracks_.clear();
+  window_.reset();
+  displacement_.clear();
+}
+
+}  // namespace ear

@@ -1,0 +1,88 @@
+// The cameras as a source: the features of a frame are checked, become a clone with tracks, and tracks that end update
+// the filter. docs/filter.md, "Features", "Window", "Images that show nothing".
+#pragma once
+
+#include <optional>
+
+#include "ear/calibration.h"
+#include "ear/filter_config.h"
+#include "filter/ekf/displacement.h"
+#include "filter/ekf/ekf.h"
+#include "filter/ekf/imu_displacement.h"
+#include "filter/ekf/records.h"
+#include "filter/sources/cameras/camera_displacement.h"
+#include "filter/sources/cameras/frame_check.h"
+#include "filter/sources/cameras/image_noise.h"
+#include "filter/sources/cameras/stereo_motion.h"
+#include "filter/sources/cameras/track_update.h"
+#include "filter/sources/cameras/tracks.h"
+#include "filter/sources/cameras/window_rule.h"
+
+namespace ear {
+
+/// The last image that was used.
+struct LastImage {
+  TimeNs t_ns = 0;                                   ///< its camera stamp
+  Pose T_WB;                                         ///< the body then
+  Eigen::Vector3d rate_B = Eigen::Vector3d::Zero();  ///< its rate then [rad/s]
+};
+
+class Cameras {
+ public:
+  Cameras(const FilterConfig& config, const Calibration& calibration);
+
+  [[nodiscard]] std::size_t count() const { return count_; }
+  /// Keeps no more than so many clones from the next frame on.
+  void set_window(int clones) { window_.set_size(clones); }
+
+  /// A new frame: how exact are its features? Kept for all that is done with it.
+  void measure_noise(const FeatureFrame& frame, const CameraState& cameras);
+  /// p^c of (13). `motion`: by the inertial samples, from where the state is to the frame at `t_ns` (IMU time).
+  [[nodiscard]] Displacement displacement(const FeatureFrame& frame, TimeNs t_ns, const ImuMotion& motion,
+                                          const Ekf& ekf);
+
+  /// Where the inertial samples since the last image may be wrong by more than noise (clipped, missing, stamps that
+  /// jumped), the two images show how the body moved, roughly: later, the features of both will show it in full, around
+  /// a state that is near enough to be linear. True if they did.
+  bool bridge(const FeatureFrame& frame, Ekf& ekf);
+  /// At the state's time, which is the frame's, before the frame changes it: does it show the motion since the last
+  /// image that the other sensors predict?
+  [[nodiscard]] FrameAgreement compare(const FeatureFrame& frame, const Ekf& ekf);
+
+  /// The body's pose joins the window, with what was seen from it (`weight`: (15)); tracks that end update the state.
+  void update(const FeatureFrame& frame, double weight, CameraUpdate calibration, Ekf& ekf, Records& records);
+  /// The body's pose joins the window, without an image.
+  void clone_without_image(double weight, Ekf& ekf);
+  /// The state is as well known as if features had updated it.
+  void set_updated(TimeNs t_ns) { window_.set_updated(t_ns); }
+
+  /// The frame was used; the next one is compared with it.
+  void remember(const FeatureFrame& frame, const Ekf& ekf);
+  [[nodiscard]] const std::optional<LastImage>& last_image() const { return last_; }
+
+  /// The state begins anew.
+  void reset();
+
+ private:
+  [[nodiscard]] Pose motion_since_image(const ImuState& x) const;
+  [[nodiscard]] double apparent_rate(double dt, const Ekf& ekf) const;
+  void marginalise(std::optional<std::size_t> clone, Ekf& ekf);
+
+  FilterConfig config_;
+  std::size_t count_;
+  double focal_px_;
+  TrackTable tracks_;
+  TrackUpdate track_update_;
+  WindowRule window_;
+  ImageNoise image_noise_;
+  double noise_ = 1.0;  ///< standard deviation of the features of the frame at hand, times the usual
+  FrameCheck frame_check_;
+  StereoMatches matches_;
+  CameraDisplacement displacement_;
+  TimeNs compared_ns_ = 0;  ///< where the last interval of displacement() ended
+  std::optional<LastImage> last_;
+  FeatureFrame last_features_;
+  Eigen::MatrixXd rows_;  // memory that is used again
+};
+
+}  // namespace ear

@@ -1,0 +1,236 @@
+#include "filter/sources/cameras/feature_update.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+
+namespace ear {
+namespace {
+
+constexpr int kCalibration = 12;  // columns of the cameras' poses; the time offset acts through the clones
+
+/// First column of a clone, counted from err::camera.
+constexpr int clone_column(int clone) { return err::clone(clone) - err::camera; }
+
+/// The rows of which A = H^T H and b = H^T r are the sums: Cholesky with diagonal pivoting, row by row. A, of which
+/// only the lower triangle is read, is singular (yaw and position are free, calibration is seen in part). The largest
+/// pivot against `scale` comes first, so that rounding does not grow; one lost in rounding says nothing, and ends it.
+/// Without the pivoting rounding makes up rows, and once in some ten thousand frames one that moves the estimate by ten
+/// sigmas. b is overwritten; `pivots` is scratch.
+void rows_from_sums(const Eigen::Ref<const Eigen::MatrixXd>& A, Eigen::Ref<Eigen::VectorXd> b,
+                    Eigen::Ref<Eigen::VectorXd> pivots, const Eigen::VectorXd& scale, double negligible,
+                    WhitenedRows& rows) {
+  const int size = static_cast<int>(b.size());
+  auto& Ht = rows.H_transposed;
+  pivots = A.diagonal();
+  rows.count = 0;
+  while (rows.count < size) {
+    int j = 0;
+    double largest = 0.0;
+    for (int k = 0; k < size; ++k) {
+      if (pivots(k) <= largest * scale(k)) continue;
+      largest = pivots(k) / scale(k);
+      j = k;
+    }
+    if (largest <= negligible) break;
+    const double root = std::sqrt(pivots(j));
+    auto u = Ht.col(rows.count).head(size);
+    u.head(j) = A.row(j).head(j).transpose();
+    u.tail(size - j) = A.col(j).tail(size - j);
+    u.noalias() -= Ht.topLeftCorner(size, rows.count) * Ht.row(j).head(rows.count).transpose();
+    u /= root;
+    u = (pivots.array() > 0.0).select(u, 0.0);  // those that came before are done
+    u(j) = root;
+    rows.r(rows.count) = b(j) / root;
+    b -= rows.r(rows.count) * u;
+    pivots -= u.cwiseAbs2();
+    pivots(j) = 0.0;
+    ++rows.count;
+  }
+  rows.H.topLeftCorner(rows.count, size) = Ht.topLeftCorner(size, rows.count).transpose();
+}
+
+}  // namespace
+
+void camera_poses(const State& x, std::vector<CameraPose>& poses) {
+  const Pose& T_BC0 = x.camera.T_BC0;
+  const Eigen::Matrix3d R_BC1 = T_BC0.R * x.camera.T_C0C1.R;
+  const Eigen::Vector3d p_BC1 = T_BC0.R * x.camera.T_C0C1.p + T_BC0.p;
+  poses.resize(2 * x.clones.size());
+  for (std::size_t i = 0; i < x.clones.size(); ++i) {
+    const Pose& T_WB = x.clones[i].T_WB;
+    poses[2 * i] = {(T_WB.R * T_BC0.R).transpose(), T_WB.p + T_WB.R * T_BC0.p};
+    poses[2 * i + 1] = {(T_WB.R * R_BC1).transpose(), T_WB.p + T_WB.R * p_BC1};
+  }
+}
+
+LinearizedObservation linearize_observation(const State& x, int clone, int camera, const InverseDepthPoint& point,
+                                            const Eigen::Vector2d& uv) {
+  const Clone& seen_from = x.clones[static_cast<std::size_t>(clone)];
+  LinearizedObservation z = linearize_observation(seen_from.T_WB, x.camera, camera, point, uv);
+  z.clone = clone;
+  z.noise = seen_from.feature_noise;
+  return z;
+}
+
+LinearizedObservation linearize_observation(const Pose& T_WB, const CameraState& cameras, int camera,
+                                            const InverseDepthPoint& point, const Eigen::Vector2d& uv) {
+  const Pose& T_BC0 = cameras.T_BC0;
+  const Pose& T_C0C1 = cameras.T_C0C1;
+  const double s = point.inverse_depth;  // all points below are times s: finite at infinity
+  const Eigen::Vector3d f_W = point.scaled_W();
+  const Eigen::Vector3d f_B = T_WB.R.transpose() * (f_W - s * T_WB.p);
+  const Eigen::Matrix3d R_C0B = T_BC0.R.transpose();
+  const Eigen::Vector3d from_C0_B = f_B - s * T_BC0.p;
+  const Eigen::Vector3d f_C0 = R_C0B * from_C0_B;
+  const Eigen::Vector3d from_C1_C0 = f_C0 - s * T_C0C1.p;
+  const Eigen::Vector3d h = camera == 0 ? f_C0 : Eigen::Vector3d(T_C0C1.R.transpose() * from_C1_C0);
+
+  const double w = 1.0 / h.z();
+  LinearizedObservation z;
+  z.residual = uv - h.head<2>() * w;
+  Eigen::Matrix<double, 2, 3> J_C;  // d uv / d h
+  J_C << w, 0.0, -h.x() * w * w, 0.0, w, -h.y() * w * w;
+  const Eigen::Matrix<double, 2, 3> J_C0 = camera == 0 ? J_C : Eigen::Matrix<double, 2, 3>(J_C * T_C0C1.R.transpose());
+  const Eigen::Matrix<double, 2, 3> J_B = J_C0 * R_C0B;
+  const Eigen::Matrix<double, 2, 3> J_W = J_B * T_WB.R.transpose();
+
+  // R^T (f - p) with R = Exp(theta) R^, p = Exp(theta) p^ + rho: the point's own error is all that f_W carries.
+  z.H_clone.leftCols<3>() = J_W * skew(f_W);
+  z.H_clone.rightCols<3>() = -s * J_W;
+  z.H_f = J_W;
+  z.H_calibration.leftCols<3>() = J_B * skew(from_C0_B);
+  z.H_calibration.middleCols<3>(3) = -s * J_B;
+  if (camera == 0) {
+    z.H_calibration.rightCols<6>().setZero();
+  } else {
+    z.H_calibration.middleCols<3>(6) = J_C0 * skew(from_C1_C0);
+    z.H_calibration.rightCols<3>() = -s * J_C0;
+  }
+  return z;
+}
+
+FeatureInformation::FeatureInformation(int max_clones, int max_features) {
+  const int size = err::clone(max_clones) - err::camera;
+  for (Eigen::MatrixXd* const matrix :
+       {&A_, &gate_A_, &gate_PHt_, &rows_.H, &rows_.H_transposed, &gate_rows_.H, &gate_rows_.H_transposed}) {
+    matrix->resize(size, size);
+  }
+  for (Eigen::VectorXd* const vector : {&b_, &gate_b_, &scale_, &pivots_, &rows_.r, &gate_rows_.r}) {
+    vector->resize(size);
+  }
+  W_.resize(size, 3 * max_features);
+  weights_.reserve(2 * static_cast<std::size_t>(max_clones));
+}
+
+void FeatureInformation::start(int error_size) {
+  size_ = error_size - err::camera;
+  assert(size_ <= A_.rows());
+  features_ = 0;
+  rows_.count = 0;
+  A_.topLeftCorner(size_, size_).setZero();
+  b_.head(size_).setZero();
+}
+
+bool FeatureInformation::add(const std::vector<LinearizedObservation>& observations, double sigma, double huber,
+                             const Eigen::Ref<const Eigen::MatrixXd>& P, const Gate& gate) {
+  const int dof = 2 * static_cast<int>(observations.size()) - 3;
+  if (dof <= 0 || 3 * (features_ + 1) > W_.cols()) return false;
+
+  // The feature's own block first: it alone decides, most of the time, about the gate.
+  Eigen::Matrix3d V = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d v = Eigen::Vector3d::Zero();
+  double cost = 0.0;
+  weights_.clear();
+  for (const LinearizedObservation& z : observations) {
+    const double sigma_z = sigma * z.noise;
+    const double distance = z.residual.norm() / sigma_z;
+    const double w = (distance > huber ? huber / distance : 1.0) / (sigma_z * sigma_z);  // Huber's, and whitening
+    weights_.push_back(w);
+    V.noalias() += w * z.H_f.transpose() * z.H_f;
+    v.noalias() += w * z.H_f.transpose() * z.residual;
+    cost += w * z.residual.squaredNorm();
+  }
+  V.diagonal().array() += 1e-13 * V.trace();  // a point at infinity has no depth to project out
+  const Eigen::LLT<Eigen::Matrix3d> V_llt(V);
+  if (V_llt.info() != Eigen::Success || !std::isfinite(cost)) return false;
+  const Eigen::Vector3d Lv = V_llt.matrixL().solve(v);
+
+  auto W = W_.block(0, 3 * features_, size_, 3);
+  W.setZero();
+  for (std::size_t i = 0; i < observations.size(); ++i) {
+    const LinearizedObservation& z = observations[i];
+    const Eigen::Matrix<double, 2, 3> wH_f = weights_[i] * z.H_f;
+    W.topRows<kCalibration>().noalias() += z.H_calibration.transpose().lazyProduct(wH_f);
+    W.middleRows<err::clone_size>(clone_column(z.clone)).noalias() += z.H_clone.transpose().lazyProduct(wH_f);
+  }
+  V_llt.matrixU().solveInPlace<Eigen::OnTheRight>(W);
+
+  // With P = 0 the statistic is largest: who passes then passes anyway, and the full test is not needed.
+  const double residual_cost = cost - Lv.squaredNorm();
+  if (!gate.fits_distance(residual_cost, dof) &&
+      !gate.fits_distance(chi_squared(observations, Lv, P, residual_cost), dof)) {
+    return false;
+  }
+  sum_up(observations, Lv, A_, b_);
+  ++features_;
+  return true;
+}
+
+/// Adds the feature at hand, the last in W_, to A and b: its own block is not yet projected out of A, but out of b.
+void FeatureInformation::sum_up(const std::vector<LinearizedObservation>& observations, const Eigen::Vector3d& Lv,
+                                Eigen::MatrixXd& A, Eigen::VectorXd& b) const {
+  for (std::size_t i = 0; i < observations.size(); ++i) {
+    const LinearizedObservation& z = observations[i];
+    const double w = weights_[i];
+    const int at = clone_column(z.clone);
+    const Eigen::Matrix<double, kCalibration, 2> Hw_cal = w * z.H_calibration.transpose();
+    const Eigen::Matrix<double, err::clone_size, 2> Hw_clone = w * z.H_clone.transpose();
+    A.topLeftCorner<kCalibration, kCalibration>().noalias() += Hw_cal.lazyProduct(z.H_calibration);
+    A.block<err::clone_size, kCalibration>(at, 0).noalias() += Hw_clone.lazyProduct(z.H_calibration);
+    A.block<err::clone_size, err::clone_size>(at, at).noalias() += Hw_clone.lazyProduct(z.H_clone);
+    b.head<kCalibration>().noalias() += Hw_cal.lazyProduct(z.residual);
+    b.segment<err::clone_size>(at).noalias() += Hw_clone.lazyProduct(z.residual);
+  }
+  b.head(size_).noalias() -= W_.block(0, 3 * features_, size_, 3) * Lv;
+}
+
+/// r^T (H P H^T + I)^-1 r over all rows of the feature at hand, the last in W_. `residual_cost`: r^T r. What the
+/// projected rows do not show of r is noise alone.
+double FeatureInformation::chi_squared(const std::vector<LinearizedObservation>& observations,
+                                       const Eigen::Vector3d& Lv, const Eigen::Ref<const Eigen::MatrixXd>& P,
+                                       double residual_cost) {
+  auto A = gate_A_.topLeftCorner(size_, size_);
+  auto b = gate_b_.head(size_);
+  A.setZero();
+  b.setZero();
+  sum_up(observations, Lv, gate_A_, gate_b_);
+  scale_.head(size_) = A.diagonal();
+  A.selfadjointView<Eigen::Lower>().rankUpdate(W_.block(0, 3 * features_, size_, 3), -1.0);
+  rows_from_sums(A, b, pivots_.head(size_), scale_, kRounding, gate_rows_);
+
+  const int rows = gate_rows_.count;
+  const auto H = gate_rows_.H.topLeftCorner(rows, size_);
+  auto r = gate_rows_.r.head(rows);
+  auto PHt = gate_PHt_.topLeftCorner(size_, rows);
+  PHt.noalias() = P.block(err::camera, err::camera, size_, size_) * H.transpose();
+  Eigen::Ref<Eigen::MatrixXd> S = gate_A_.topLeftCorner(rows, rows);  // the sum is read no more
+  S.noalias() = H * PHt;
+  S.diagonal().array() += 1.0;
+  const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> llt(S);  // in place
+  const double noise_cost = residual_cost - r.squaredNorm();
+  llt.matrixL().solveInPlace(r);
+  return noise_cost + r.squaredNorm();
+}
+
+void FeatureInformation::compress(double negligible) {
+  rows_.count = 0;
+  if (features_ == 0) return;
+  auto A = A_.topLeftCorner(size_, size_);
+  scale_.head(size_) = A.diagonal();
+  A.selfadjointView<Eigen::Lower>().rankUpdate(W_.topLeftCorner(size_, 3 * features_), -1.0);
+  rows_from_sums(A, b_.head(size_), pivots_.head(size_), scale_, negligible, rows_);
+}
+
+}  // namespace ear

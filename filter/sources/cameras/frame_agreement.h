@@ -1,0 +1,21 @@
+// How far a frame agrees with the motion that the other sensors predict: what the health reads of the images.
+#pragma once
+
+#include <Eigen/Core>
+
+namespace ear {
+
+struct FrameAgreement {
+  int matches = 0;             ///< features seen by both cameras in the first frame, by the left one in the second
+  double left = 0.0;           ///< share of them that are not where they were expected: left camera
+  double right = 0.0;          ///< right camera
+  double apparent_rate = 0.0;  ///< [rad/s] so fast the cameras' calibration may make it seem to turn
+  // What the image tells by itself, whatever came before.
+  double noise = 1.0;   ///< of the features, times the usual
+  double behind = 0.0;  ///< share of the stereo features that the geometry puts behind the cameras
+  bool frozen = false;  ///< the image is exactly the one before
+  Eigen::Vector3d turn = Eigen::Vector3d::Zero();  ///< by which the vehicle turned more than predicted [rad], in B
+  double turn_sigma = 0.0;                         ///< [rad] its standard deviation, the worst axis; 0: not known
+};
+
+}  // namespace ear

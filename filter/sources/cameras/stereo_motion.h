@@ -1,0 +1,55 @@
+// How the body moved between two frames, from the features that both cameras saw in the first: no filter, no window.
+// docs/filter.md, section 13.
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <vector>
+
+#include "ear/types.h"
+#include "filter/ekf/state.h"
+
+namespace ear {
+
+/// A feature seen in two frames. What stands before the number of the frame is normalized.
+struct StereoMatch {
+  Eigen::Vector2d left0, right0;  ///< in frame 0
+  Eigen::Vector2d left1, right1;  ///< in frame 1
+  bool has_right1 = false;
+};
+
+/// Finds the features with an observation in both cameras of one frame, and in the left one of another.
+class StereoMatches {
+ public:
+  StereoMatches();
+
+  /// The features of both frames; valid until the next call.
+  const std::vector<StereoMatch>& find(const FeatureFrame& from, const FeatureFrame& to);
+
+ private:
+  std::vector<const FeatureObservation*> earlier_;  ///< those of `from`, by id
+  std::vector<StereoMatch> matches_;
+};
+
+/// Depth along the ray of the left camera: least squares over the right one, linear. Inverse [1/m]; negative where the
+/// images contradict the cameras' geometry.
+[[nodiscard]] double stereo_inverse_depth(const CameraState& cameras, const Eigen::Vector2d& left,
+                                          const Eigen::Vector2d& right);
+
+/// The motion from frame 0 to frame 1.
+struct StereoMotion {
+  Eigen::Matrix3d R_B0B1 = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d p_B0B1 = Eigen::Vector3d::Zero();          ///< [m]
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();  ///< of p_B0B1 [m^2]
+  int matches = 0;
+  int fitting = 0;  ///< of these
+};
+
+/// Least squares over rotation and translation: the points seen in frame 0, projected into both cameras of frame 1.
+/// Observations further off than `huber` standard deviations weigh less. `sigma`: one observation, normalized; `start`:
+/// where to begin. Nothing if the points do not tell, or most of them do not move as one body.
+[[nodiscard]] std::optional<StereoMotion> stereo_motion(const std::vector<StereoMatch>& matches,
+                                                        const CameraState& cameras, const StereoMotion& start,
+                                                        double sigma);
+
+}  // namespace ear

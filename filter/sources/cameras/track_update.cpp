@@ -1,0 +1,127 @@
+#include "filter/sources/cameras/track_update.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "filter/ingest/capacity.h"
+
+namespace ear {
+namespace {
+
+constexpr double kNegligible = 1e-4;  // measured, docs/performance.md: 2e-4 of a frame's information, 12 % of the rows
+constexpr std::size_t kMinObservations = 2;  // clones that must have seen a feature: fewer show no parallax
+
+int clone_index(const State& x, std::uint64_t frame) {
+  const auto clone = std::lower_bound(x.clones.begin(), x.clones.end(), frame,
+                                      [](const Clone& c, std::uint64_t f) { return c.frame < f; });
+  return static_cast<int>(clone - x.clones.begin());
+}
+
+}  // namespace
+
+TrackUpdate::TrackUpdate(const FilterConfig& config, double focal_px, std::size_t cameras)
+    : config_(config),
+      focal_px_(focal_px),
+      camera_count_(cameras),
+      information_(config.window + 1, config.max_track_updates) {
+  const auto clones = static_cast<std::size_t>(config.window) + 1;
+  cameras_.reserve(2 * clones);
+  sightings_.reserve(2 * clones);
+  observations_.reserve(2 * clones);
+  selected_.reserve(2 * kFeatureCapacity);
+  frame_ids_.reserve(kFeatureCapacity);
+}
+
+void TrackUpdate::update(const FeatureFrame& frame, bool oldest_goes, CameraUpdate calibration, TrackTable& tracks,
+                         Ekf& ekf, Records& records) {
+  const State& x = ekf.state();
+  select(frame, oldest_goes ? std::optional(x.clones.front().frame) : std::nullopt, tracks);
+  information_.start(x.error_size());
+  residuals_ = {};
+  camera_poses(x, cameras_);
+  for (const std::size_t i : selected_) {
+    ++(add(tracks[i], ekf) ? records.statistics.features_used : records.statistics.features_rejected);
+    tracks[i].observations.clear();  // each observation is used once
+  }
+  log(ekf, records);
+  information_.compress(kNegligible);
+  if (information_.residual().size() > 0) {
+    ekf.apply(information_.H(), err::camera, information_.residual(), calibration, true);
+  }
+  // Features that ended, used or not, are forgotten.
+  tracks.keep_if([&](const Track& track) { return !track.observations.empty() && continues(track.id); });
+}
+
+/// The longest first.
+void TrackUpdate::select(const FeatureFrame& frame, std::optional<std::uint64_t> oldest, const TrackTable& tracks) {
+  frame_ids_.clear();
+  for (const FeatureObservation& feature : frame.features) frame_ids_.push_back(feature.id);
+  std::sort(frame_ids_.begin(), frame_ids_.end());
+  selected_.clear();
+  for (std::size_t i = 0; i < tracks.size(); ++i) {
+    const Track& track = tracks[i];
+    if (track.observations.size() < kMinObservations) continue;
+    const bool fills_window = oldest && track.observations.front().frame == *oldest;
+    if (!continues(track.id) || fills_window) selected_.push_back(i);
+  }
+  const auto longer = [&](std::size_t a, std::size_t b) {
+    const std::size_t observations_a = tracks[a].observations.size();
+    const std::size_t observations_b = tracks[b].observations.size();
+    return observations_a != observations_b ? observations_a > observations_b : a < b;
+  };
+  std::sort(selected_.begin(), selected_.end(), longer);
+  const auto limit = static_cast<std::size_t>(config_.max_track_updates);
+  if (selected_.size() > limit) selected_.resize(limit);
+}
+
+bool TrackUpdate::continues(std::uint64_t id) const {
+  return std::binary_search(frame_ids_.begin(), frame_ids_.end(), id);
+}
+
+bool TrackUpdate::add(const Track& track, const Ekf& ekf) {
+  const State& x = ekf.state();
+  sightings_.clear();
+  const auto camera = [&](int clone, int which) { return cameras_[static_cast<std::size_t>(2 * clone + which)]; };
+  for (const TrackObservation& o : track.observations) {
+    const int clone = clone_index(x, o.frame);
+    const CameraPose& left = camera(clone, 0);
+    sightings_.push_back({left.R_CW, left.p_WC, o.left});
+    if (!o.has_right) continue;
+    const CameraPose& right = camera(clone, 1);
+    sightings_.push_back({right.R_CW, right.p_WC, o.right});
+  }
+  const std::optional<InverseDepthPoint> point = triangulate(sightings_);
+  if (!point) return false;
+  observations_.clear();
+  for (const TrackObservation& o : track.observations) {
+    const int clone = clone_index(x, o.frame);
+    add_observation(x, clone, 0, *point, o.left);
+    if (o.has_right) add_observation(x, clone, 1, *point, o.right);
+  }
+  return information_.add(observations_, config_.feature_sigma_px / focal_px_,
+                          config_.huber_px / config_.feature_sigma_px, ekf.covariance().matrix(), ekf.gate());
+}
+
+void TrackUpdate::add_observation(const State& x, int clone, std::size_t camera, const InverseDepthPoint& point,
+                                  const Eigen::Vector2d& uv) {
+  observations_.push_back(linearize_observation(x, clone, static_cast<int>(camera), point, uv));
+  residuals_[camera].squares_px2 += focal_px_ * focal_px_ * observations_.back().residual.squaredNorm();
+  residuals_[camera].count += 2;
+}
+
+/// What both cameras saw of this frame's features, against where they were found to be.
+void TrackUpdate::log(const Ekf& ekf, Records& records) const {
+  for (std::size_t camera = 0; camera < camera_count_; ++camera) {
+    const Residuals& seen = residuals_[camera];
+    if (seen.count == 0) continue;
+    InnovationLog::Features features;
+    features.used = records.statistics.features_used;
+    features.rejected = records.statistics.features_rejected;
+    features.rms_px = std::sqrt(seen.squares_px2 / seen.count);
+    features.variance_px2 = config_.feature_sigma_px * config_.feature_sigma_px;
+    features.gate = ekf.gate().quantile(1);
+    records.log.add(camera == 0 ? Source::camera_left : Source::camera_right, features, ekf.state().imu.t_ns);
+  }
+}
+
+}  // namespace ear

@@ -1,0 +1,35 @@
+// Where a feature is, from rays of known cameras.
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <vector>
+
+#include "filter/ekf/state.h"
+
+namespace ear {
+
+/// One ray: a camera's pose and what it saw, normalized.
+struct Sighting {
+  Eigen::Matrix3d R_CW;
+  Eigen::Vector3d p_WC;
+  Eigen::Vector2d uv;
+};
+
+/// A point by its direction (alpha, beta, 1) in an anchor camera and its inverse depth there [1/m]; stays regular for
+/// points far away.
+struct InverseDepthPoint {
+  Eigen::Matrix3d R_WA = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d p_WA = Eigen::Vector3d::Zero();
+  Eigen::Vector3d bearing_A = Eigen::Vector3d::UnitZ();
+  double inverse_depth = 0.0;
+
+  /// The point times its inverse depth, in the world: finite for points at infinity.
+  [[nodiscard]] Eigen::Vector3d scaled_W() const { return R_WA * bearing_A + inverse_depth * p_WA; }
+};
+
+/// Least squares over all sightings (at least two), anchored at the first: linear start, then Gauss-Newton in inverse
+/// depth. Nothing if the point comes to lie behind a camera or the iteration does not settle.
+[[nodiscard]] std::optional<InverseDepthPoint> triangulate(const std::vector<Sighting>& sightings);
+
+}  // namespace ear

@@ -1,0 +1,180 @@
+#include "filter/sources/ground/contact.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace ear {
+namespace {
+
+constexpr double kGravity = 9.81;       // [m/s^2]
+constexpr double kFreeFall = 3.0;       // [m/s^2] less specific force than this, and nothing carries the vehicle
+constexpr double kFallDuration = 0.04;  // [s]
+constexpr double kConfirmation = 0.1;   // [s] for which a strike or driven wheels confirm
+constexpr double kJustNow = 0.3;        // [s] the way rolled in this time counts for the tolerance
+constexpr double kFullWay = 0.2;        // [m] of it, and the ground may be as uneven as it gets
+constexpr double kLevelSigma = 0.02;    // [m] of the wheels' height over the plane, on the ground
+constexpr double kLevelWay = 0.2;   // [m] over which this height changes; the sight of it is renewed ten times as often
+constexpr double kLevelTime = 2.0;  // [s] the same for a vehicle at rest
+constexpr double kLongestStep = 0.1;    // [s] between inertial samples
+constexpr double kAirSpeed = 1.0;       // [m/s] at which the ground passes below a flying vehicle
+constexpr double kFirstDuration = 0.1;  // [s] of evidence for the first mode
+constexpr double kSilence = 0.3;        // [s] without a reading that agrees, and the beams say nothing
+constexpr double kHeightKnown = 0.05;   // [m]
+constexpr double kNormalKnown = 0.087;  // [rad]
+
+}  // namespace
+
+ContactDetector::ContactDetector(const ContactConfig& config, const Calibration& calibration) : config_(config) {
+  if (!calibration.encoder) return;
+  if (!calibration.lasers || calibration.lasers->beams.empty()) {
+    mode_ = ContactMode::ground;
+    return;
+  }
+  y_B_ = calibration.encoder->T_BO.linear().col(1);
+  ground_.emplace(*calibration.lasers, *calibration.encoder);
+  wheels_.emplace(*calibration.encoder);
+}
+
+std::optional<TimeNs> ContactDetector::since_ns() const {
+  return since_ns_ == kNever ? std::nullopt : std::optional(since_ns_);
+}
+
+std::optional<double> ContactDetector::height() const {
+  if (!ground_ || ground_->height_sigma() > kHeightKnown) return std::nullopt;
+  return ground_->height();
+}
+
+std::optional<Eigen::Vector3d> ContactDetector::n_B() const {
+  if (!ground_ || ground_->normal_sigma() > kNormalKnown) return std::nullopt;
+  return ground_->n_B();
+}
+
+ContactEvent ContactDetector::add_imu(const ImuSample& sample) {
+  if (!ground_ || !sample.gyro_B.allFinite() || !sample.accel_B.allFinite()) return ContactEvent::none;
+  if (sample.t_ns <= last_imu_ns_) return ContactEvent::none;
+  const bool first = last_imu_ns_ == kNever;
+  const double dt = first ? 0.0 : std::min(seconds_between(last_imu_ns_, sample.t_ns), kLongestStep);
+  last_imu_ns_ = sample.t_ns;
+
+  const Eigen::Vector3d angle_B = dt * (sample.gyro_B - b_g_);
+  ground_->turn(angle_B, sample.accel_B, dt);
+  wheels_->turn_body(angle_B.dot(y_B_));
+  if (mode_ != ContactMode::ground) ground_->move(kAirSpeed * dt);
+
+  const double force = sample.accel_B.norm();
+  if (force > kFreeFall) {
+    falling_since_ns_ = kNever;
+  } else if (falling_since_ns_ == kNever) {
+    falling_since_ns_ = sample.t_ns;
+  }
+  if (std::abs(force - kGravity) > config_.strike) {
+    strike_ns_ = sample.t_ns;
+    ground_->strike();
+  }
+  return look_for_confirmed_touchdown(sample.t_ns);
+}
+
+ContactEvent ContactDetector::add_encoder(const EncoderSample& sample) {
+  if (!ground_) return ContactEvent::none;
+  const std::optional<WheelWatch::Motion> motion = wheels_->add(sample);
+  if (!motion) return ContactEvent::none;
+  if (motion->driven) driven_ns_ = sample.t_ns;
+  roll(*motion);
+  return look_for_confirmed_touchdown(sample.t_ns);
+}
+
+ContactEvent ContactDetector::add_laser(const LaserSample& sample) {
+  if (!ground_) return ContactEvent::none;
+  const GroundTracker::Sighting sighting = ground_->update(sample);
+  if (sighting.agreeing > 0) seen_ns_ = sample.t_ns;
+  switch (mode_) {
+    case ContactMode::unknown:
+      return look_for_first_evidence(sample.t_ns);
+    case ContactMode::ground:
+      return look_for_takeoff(sighting, sample.t_ns);
+    case ContactMode::air:
+      return look_for_touchdown(sample.t_ns);
+  }
+  return ContactEvent::none;
+}
+
+/// On the ground every metre rolled is new ground: another normal, another height of the wheels over the plane.
+void ContactDetector::roll(const WheelWatch::Motion& motion) {
+  recent_way_ = recent_way_ * std::exp(-motion.dt / kJustNow) + motion.distance;
+  if (mode_ != ContactMode::ground) return;
+  ground_->move(motion.distance);
+  const double renewals = motion.distance / (0.1 * kLevelWay) + motion.dt / kLevelTime;
+  ground_->suppose_height(level_, kLevelSigma / std::sqrt(renewals));
+  const double share = 1.0 - std::exp(-motion.distance / kLevelWay - motion.dt / kLevelTime);
+  const double level = level_ + share * (ground_->height() - level_);
+  level_ = std::clamp(level, -config_.touchdown_height, config_.touchdown_height);
+}
+
+/// How far the wheels may seem to be above `level_` without being in the air.
+double ContactDetector::tolerance(bool all_agree) const {
+  const double doubt = all_agree ? std::min(1.0, recent_way_ / kFullWay) : 1.0;
+  return config_.takeoff_height + config_.unevenness * doubt;
+}
+
+ContactEvent ContactDetector::look_for_first_evidence(TimeNs t_ns) {
+  if (!lasts(ground_->height_sigma() < kHeightKnown, t_ns, kFirstDuration)) return ContactEvent::none;
+  return change(ground_->height() < config_.confirmed_height ? ContactMode::ground : ContactMode::air, t_ns);
+}
+
+/// Every beam that is believed must see the ground below the wheels, and there must be two (one, where there is but
+/// one).
+ContactEvent ContactDetector::look_for_takeoff(const GroundTracker::Sighting& sighting, TimeNs t_ns) {
+  const double lowest = ground_->height() - 2.0 * ground_->height_sigma();
+  const bool airborne = sighting.agreeing >= std::min(2, ground_->beams()) &&
+                        lowest > level_ + tolerance(sighting.agreeing == ground_->beams()) &&
+                        sighting.lowest_lift > level_ + 0.5 * config_.takeoff_height;
+  const bool falling = falling_since_ns_ != kNever && seconds_between(falling_since_ns_, t_ns) > kFallDuration;
+  if (!lasts(airborne, t_ns, falling ? 0.0 : config_.takeoff_duration)) return ContactEvent::none;
+  return change(ContactMode::air, t_ns);
+}
+
+ContactEvent ContactDetector::look_for_touchdown(TimeNs t_ns) {
+  const bool standing = ground_->height_sigma() < config_.touchdown_height &&
+                        ground_->height() < config_.touchdown_height &&
+                        std::abs(ground_->climb()) < config_.touchdown_climb;
+  if (lasts(standing, t_ns, config_.touchdown_duration)) return change(ContactMode::ground, t_ns);
+  return look_for_confirmed_touchdown(t_ns);
+}
+
+/// Something struck the vehicle, or drives its wheels, while it is low. Where the beams say nothing it takes both.
+ContactEvent ContactDetector::look_for_confirmed_touchdown(TimeNs t_ns) {
+  if (mode_ != ContactMode::air) return ContactEvent::none;
+  const auto just_now = [&](TimeNs what_ns) {  // and not before the vehicle left the ground
+    return what_ns > since_ns_ && seconds_between(what_ns, t_ns) < kConfirmation;
+  };
+  const bool struck = just_now(strike_ns_);
+  const bool driven = just_now(driven_ns_);
+  const bool silent = seconds_between(seen_ns_, t_ns) > kSilence;
+  const bool low = ground_->height_sigma() < kHeightKnown && ground_->height() < config_.confirmed_height;
+  if (silent ? struck && driven : low && (struck || driven)) return change(ContactMode::ground, t_ns);
+  return ContactEvent::none;
+}
+
+bool ContactDetector::lasts(bool holds, TimeNs t_ns, double duration) {
+  if (!holds) {
+    holds_since_ns_ = kNever;
+    return false;
+  }
+  if (holds_since_ns_ == kNever) holds_since_ns_ = t_ns;
+  return seconds_between(holds_since_ns_, t_ns) >= duration;
+}
+
+ContactEvent ContactDetector::change(ContactMode mode, TimeNs t_ns) {
+  const bool first = mode_ == ContactMode::unknown;
+  mode_ = mode;
+  since_ns_ = t_ns;
+  holds_since_ns_ = kNever;
+  if (mode == ContactMode::ground) {
+    level_ = std::clamp(ground_->height(), -config_.touchdown_height, config_.touchdown_height);
+    recent_way_ = kFullWay;  // on new ground
+  }
+  if (first) return ContactEvent::none;
+  return mode == ContactMode::ground ? ContactEvent::touchdown : ContactEvent::takeoff;
+}
+
+}  // namespace ear

@@ -1,0 +1,80 @@
+// Does the vehicle stand or roll on the ground, or does it fly? The beams decide: contact is when the plane they hit
+// passes the wheel radius below the axle. A strike or wheels that are spun up from below only make the decision faster.
+// docs/filter.md, section 11.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <limits>
+#include <optional>
+
+#include "ear/calibration.h"
+#include "ear/filter_config.h"
+#include "ear/types.h"
+#include "filter/sources/ground/ground_tracker.h"
+#include "filter/sources/ground/wheel_watch.h"
+
+namespace ear {
+
+enum class ContactMode : std::uint8_t {
+  unknown,  ///< no evidence yet, or no wheels that could touch the ground
+  ground,   ///< the wheels touch it
+  air
+};
+
+enum class ContactEvent : std::uint8_t { none, touchdown, takeoff };
+
+/// Samples of all sensors in time order. A vehicle with wheels and without lasers is always on the ground.
+class ContactDetector {
+ public:
+  ContactDetector(const ContactConfig& config, const Calibration& calibration);
+
+  /// Each says whether the mode has just changed. The first mode after `unknown` is no event.
+  ContactEvent add_imu(const ImuSample& sample);
+  ContactEvent add_encoder(const EncoderSample& sample);
+  ContactEvent add_laser(const LaserSample& sample);
+
+  /// What to take off the gyroscope's rates [rad/s]; zero is good enough while all beams see the ground.
+  void set_gyro_bias(const Eigen::Vector3d& b_g) { b_g_ = b_g; }
+
+  [[nodiscard]] ContactMode mode() const { return mode_; }
+  /// When the mode began; nothing while it is unknown.
+  [[nodiscard]] std::optional<TimeNs> since_ns() const;
+  /// Does this beam give the same range again and again?
+  [[nodiscard]] bool stuck(std::size_t beam) const { return ground_ && ground_->stuck(beam); }
+  /// Height of the wheels above the ground's plane [m], if the beams tell it to 5 cm.
+  [[nodiscard]] std::optional<double> height() const;
+  /// Unit normal of the ground in the body frame, if the beams tell it to 5 degrees.
+  [[nodiscard]] std::optional<Eigen::Vector3d> n_B() const;
+
+ private:
+  static constexpr TimeNs kNever = std::numeric_limits<TimeNs>::min() / 2;
+
+  ContactEvent change(ContactMode mode, TimeNs t_ns);
+  ContactEvent look_for_first_evidence(TimeNs t_ns);
+  ContactEvent look_for_takeoff(const GroundTracker::Sighting& sighting, TimeNs t_ns);
+  ContactEvent look_for_touchdown(TimeNs t_ns);
+  ContactEvent look_for_confirmed_touchdown(TimeNs t_ns);
+  [[nodiscard]] bool lasts(bool holds, TimeNs t_ns, double duration);
+  [[nodiscard]] double tolerance(bool all_agree) const;
+  void roll(const WheelWatch::Motion& motion);
+
+  ContactConfig config_;
+  Eigen::Vector3d y_B_ = Eigen::Vector3d::UnitY();  ///< along the axle, to the left
+  std::optional<GroundTracker> ground_;             ///< none without wheels or lasers
+  std::optional<WheelWatch> wheels_;
+  Eigen::Vector3d b_g_ = Eigen::Vector3d::Zero();
+
+  ContactMode mode_ = ContactMode::unknown;
+  TimeNs since_ns_ = kNever;
+  TimeNs holds_since_ns_ = kNever;  ///< first reading in a row that speaks for a change
+  TimeNs seen_ns_ = kNever;         ///< last reading that agreed with the plane tracked
+  TimeNs driven_ns_ = kNever;       ///< when something last made the wheels turn faster
+  TimeNs last_imu_ns_ = kNever;
+  TimeNs falling_since_ns_ = kNever;
+  TimeNs strike_ns_ = kNever;
+  double recent_way_ = 0.0;  ///< rolled just now [m]
+  double level_ = 0.0;       ///< height of standing wheels over the plane, which the ground's shape explains [m]
+};
+
+}  // namespace ear

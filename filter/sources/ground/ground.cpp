@@ -1,0 +1,99 @@
+#include "filter/sources/ground/ground.h"
+
+#include <cmath>
+
+#include "filter/ekf/propagation.h"
+#include "filter/sources/ground/ground_rows.h"
+
+namespace ear {
+namespace {
+
+constexpr double kSpinUp = 0.1;     // [s] chosen: after a touchdown until the wheels roll
+constexpr double kLevelOff = 0.05;  // [m] chosen: of a plane from the wheels that stand on it
+constexpr double kLeanOff = 0.2;    // chosen: sine of the axle's angle to it
+constexpr double kPatience = 0.47;  // [s] chosen: readings that contradict the wheels for so long are believed
+
+/// Since when has it been so, in a row? Has it been for kPatience?
+bool lasts(bool holds, std::optional<TimeNs>& since_ns, TimeNs t_ns) {
+  if (!holds) {
+    since_ns.reset();
+    return false;
+  }
+  if (!since_ns) since_ns = t_ns;
+  return seconds_between(*since_ns, t_ns) > kPatience;
+}
+
+}  // namespace
+
+Ground::Ground(const FilterConfig& config, const Calibration& calibration)
+    : config_(config.odometer), contact_(config.contact, calibration) {
+  const bool lasers = calibration.lasers && !calibration.lasers->beams.empty();
+  if (lasers && config.odometer.model == OdometerModel::terrain) lasers_ = calibration.lasers;
+}
+
+/// After a change of the ground under the wheels nothing is known of it.
+ContactEvent Ground::note(ContactEvent event) {
+  if (event != ContactEvent::none) running_ = Running{};
+  return event;
+}
+
+bool Ground::rolls_at(TimeNs t_ns) const {
+  const std::optional<TimeNs> since_ns = contact_.since_ns();
+  return carries() && (!since_ns || seconds_between(*since_ns, t_ns) > kSpinUp);
+}
+
+void Ground::update(const BeamRanges& reading, const ImuBuffer& imu, CameraUpdate calibration, Ekf& ekf,
+                    Records& records) {
+  if (!lasers_ || !carries()) return;
+  const Eigen::Matrix3d R_WB = motion_at(reading.t_ns, ekf.state().imu, imu).R_WB;
+  if (!known() && !restart(reading, R_WB, ekf)) return;
+  const State& x = ekf.state();
+  GroundRows<kMaxBeams + 1> z;
+  std::array<Source, kMaxBeams> beam_of{};
+  for (std::size_t beam = 0; beam < lasers_->beams.size(); ++beam) {
+    const double range = reading.range[beam];
+    if (!(range >= lasers_->range_min && range <= lasers_->range_max)) continue;
+    const BeamPrediction predicted = predict_range(x, R_WB, beam, lasers_->beams[beam].p_BL);
+    z.H.row(z.count).segment<2>(ground_column(err::normal)) = predicted.H_normal;
+    z.H(z.count, ground_column(err::beams) + static_cast<int>(beam)) = predicted.H_tilt;
+    z.residual(z.count) = range - predicted.range;
+    z.sigma(z.count) = std::hypot(lasers_->noise, config_.unevenness);
+    beam_of[static_cast<std::size_t>(z.count++)] = beam_source(beam);
+  }
+  const int beams = z.count;
+  const AxlePrediction axle = predict_axle(x, R_WB);
+  z.H.row(z.count).segment<2>(ground_column(err::normal)) = axle.H_normal;
+  z.residual(z.count) = -axle.lean;
+  z.sigma(z.count++) = std::sqrt(2.0) * config_.unevenness / x.odometer.track_width;
+  ekf.apply(z, 1.0, calibration, [&](int row, const Innovation& innovation) {
+    if (row == beams) return axle_fits(innovation, reading.t_ns);
+    records.log.add(beam_of[static_cast<std::size_t>(row)], innovation, reading.t_ns);
+    ++(innovation.fits ? records.statistics.beams_used : records.statistics.beams_rejected);
+    return innovation.fits;
+  });
+}
+
+/// The axle stands on the ground. Where it seems not to for long, it is the plane that is wrong.
+bool Ground::axle_fits(const Innovation& lean, TimeNs t_ns) {
+  if (lasts(!lean.fits, running_.leaning_since_ns, t_ns)) running_ = Running{};
+  return lean.fits;
+}
+
+/// Where nothing is known of the ground, the plane through the hits is where the linearisation starts (2), (3). The
+/// wheels stand on it: a plane that is elsewhere is none, one of the beams hit something else. False: with this reading
+/// nothing can be begun. If it does not get better, the ground is taken for level, and the gates have to find out.
+bool Ground::restart(const BeamRanges& reading, const Eigen::Matrix3d& R_WB, Ekf& ekf) {
+  const OdometerState& o = ekf.state().odometer;
+  const Eigen::Vector3d range(reading.range[0], reading.range[1], reading.range[2]);
+  const std::optional<GroundPlane> plane = plane_through_hits(lasers_->beams, range, o.T_BO.p);
+  if (!plane) return true;
+  const bool carries = std::abs(plane->height - o.wheel_radius.mean()) < kLevelOff &&
+                       std::abs(plane->n_B.dot(o.T_BO.R.col(1))) < kLeanOff;
+  if (!carries && !lasts(true, running_.misplaced_since_ns, reading.t_ns)) return false;
+  ekf.restart_normal(carries ? Eigen::Vector3d((R_WB * plane->n_B).normalized()) : Eigen::Vector3d::UnitZ());
+  running_.misplaced_since_ns.reset();
+  running_.known = true;
+  return true;
+}
+
+}  // namespace ear

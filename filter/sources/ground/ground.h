@@ -1,0 +1,60 @@
+// The ground as a source: is the vehicle on it, where is its plane, and the rows of the laser beams that see it.
+// Contact is decided in contact.h, the rows are in ground_rows.h. docs/filter.md, "Ground".
+#pragma once
+
+#include <optional>
+
+#include "ear/calibration.h"
+#include "ear/filter_config.h"
+#include "filter/ekf/ekf.h"
+#include "filter/ekf/records.h"
+#include "filter/ingest/beam_ranges.h"
+#include "filter/ingest/imu_buffer.h"
+#include "filter/sources/ground/contact.h"
+
+namespace ear {
+
+class Ground {
+ public:
+  Ground(const FilterConfig& config, const Calibration& calibration);
+
+  /// For contact: every sample, in time order. Afterwards nothing is known of the ground if the wheels left it or met
+  /// it.
+  ContactEvent add(const ImuSample& sample) { return note(contact_.add_imu(sample)); }
+  ContactEvent add(const EncoderSample& sample) { return note(contact_.add_encoder(sample)); }
+  ContactEvent add(const LaserSample& sample) { return note(contact_.add_laser(sample)); }
+  void set_gyro_bias(const Eigen::Vector3d& b_g) { contact_.set_gyro_bias(b_g); }
+
+  /// Do the wheels carry the vehicle?
+  [[nodiscard]] bool carries() const { return contact_.mode() == ContactMode::ground; }
+  /// Do the wheels show how the vehicle moves? Not in the air, and not while the ground spins them up.
+  [[nodiscard]] bool rolls_at(TimeNs t_ns) const;
+  /// Have the lasers seen the ground since it was last touched?
+  [[nodiscard]] bool known() const { return running_.known; }
+  [[nodiscard]] const std::optional<LaserCalibration>& lasers() const { return lasers_; }
+  [[nodiscard]] bool stuck(std::size_t beam) const { return contact_.stuck(beam); }
+
+  /// One reading of the beams: a row each (2)-(4), and one for the axle, which lies along the ground.
+  void update(const BeamRanges& reading, const ImuBuffer& imu, CameraUpdate calibration, Ekf& ekf, Records& records);
+
+  /// The state begins anew.
+  void reset() { running_ = Running{}; }
+
+ private:
+  ContactEvent note(ContactEvent event);
+  bool restart(const BeamRanges& reading, const Eigen::Matrix3d& R_WB, Ekf& ekf);
+  [[nodiscard]] bool axle_fits(const Innovation& lean, TimeNs t_ns);
+
+  struct Running {
+    bool known = false;
+    std::optional<TimeNs> misplaced_since_ns;  ///< readings whose plane the wheels do not stand on
+    std::optional<TimeNs> leaning_since_ns;    ///< readings with an axle that does not lie along the ground
+  };
+
+  OdometerConfig config_;
+  std::optional<LaserCalibration> lasers_;  ///< where they are used
+  ContactDetector contact_;
+  Running running_;
+};
+
+}  // namespace ear

@@ -1,0 +1,84 @@
+// The plane under the vehicle as the laser beams see it, in the body frame, on the ground and in the air. A small
+// filter of its own, so that whether there is contact is decided without the estimate that hangs on that decision.
+//
+// State: unit normal n_B, height h of the wheels above the plane, rate of climb. A beam hits the plane where
+//   n_B . (p_BL + range d_B - p_BO) + r + h = 0,                   r: wheel radius, O: middle of the axle
+// which is linear in n_B and h: one scalar update per beam, each gated by itself. The gyroscope turns n_B.
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <vector>
+
+#include "ear/calibration.h"
+#include "ear/types.h"
+
+namespace ear {
+
+class GroundTracker {
+ public:
+  GroundTracker(const LaserCalibration& lasers, const EncoderCalibration& axle);
+
+  /// The body turned by `angle_B` [rad] in `dt` [s], and felt the specific force `accel_B` [m/s^2].
+  void turn(const Eigen::Vector3d& angle_B, const Eigen::Vector3d& accel_B, double dt);
+  /// The vehicle is `distance` [m] further on, over ground that has another slope.
+  void move(double distance);
+  /// The rate of climb may have changed at once: a strike.
+  void strike();
+  /// The wheels are said to be `level` above the plane, with standard deviation `sigma` [m]. Ignored if the beams say
+  /// otherwise.
+  void suppose_height(double level, double sigma);
+
+  /// How one reading of the beams agreed with the plane tracked so far.
+  struct Sighting {
+    int readings = 0;          ///< beams with a return
+    int agreeing = 0;          ///< those that passed the gate and updated the plane
+    double lowest_lift = 0.0;  ///< smallest height that one of those sees, with the normal tracked so far [m]
+  };
+  /// Readings in time order.
+  Sighting update(const LaserSample& sample);
+
+  /// Has this beam given the same range again and again?
+  [[nodiscard]] bool stuck(std::size_t beam) const { return beam < beams_.size() && beams_[beam].stuck; }
+  [[nodiscard]] int beams() const { return static_cast<int>(beams_.size()); }
+  [[nodiscard]] double height() const { return x_(kHeight); }  ///< of the wheels above the plane [m]
+  [[nodiscard]] double height_sigma() const;                   ///< [m]
+  [[nodiscard]] double climb() const { return x_(kClimb); }    ///< [m/s]
+  [[nodiscard]] Eigen::Vector3d n_B() const { return x_.head<3>(); }
+  [[nodiscard]] double normal_sigma() const;  ///< of the direction known worst [rad]
+
+ private:
+  static constexpr int kHeight = 3, kClimb = 4, kSize = 5;
+  using Vector = Eigen::Matrix<double, kSize, 1>;
+  using Matrix = Eigen::Matrix<double, kSize, kSize>;
+
+  struct Beam {
+    double last = 0.0;        ///< range [m]
+    int same = 0;             ///< readings in a row with this range
+    TimeNs same_from_ns = 0;  ///< the first of them
+    bool stuck = false;
+    std::optional<TimeNs> agrees_from_ns;  ///< a beam that disagreed is used again after it has agreed for some time
+    bool returning = false;
+  };
+
+  [[nodiscard]] bool usable(Beam& beam, double range, TimeNs t_ns) const;
+  void predict(double dt);
+  void forget();
+  void widen_normal(double variance);
+  bool update_with_hit(Beam& beam, const Eigen::Vector3d& d_B, const Eigen::Vector3d& hit_B, TimeNs t_ns);
+  [[nodiscard]] bool passes(const Vector& H, double residual, double variance, double gate) const;
+  void update(const Vector& H, double residual, double variance);
+
+  LaserCalibration lasers_;
+  Eigen::Vector3d p_BO_;
+  double radius_;
+  Eigen::Vector3d up_B_ = Eigen::Vector3d::Zero();  ///< against gravity, roughly; zero before the first sample
+  Vector x_ = Vector::Zero();                       ///< n_B, height, climb
+  Matrix P_ = Matrix::Zero();
+  std::vector<Beam> beams_;
+  std::optional<TimeNs> lost_from_ns_;  ///< readings of which none agreed, in a row: the first
+  bool any_ = false;
+  TimeNs last_ns_ = 0;
+};
+
+}  // namespace ear

@@ -1,0 +1,132 @@
+#include "filter/sources/sources.h"
+
+#include <cmath>
+
+#include "filter/ekf/imu_displacement.h"
+#include "filter/ekf/initial_state.h"
+
+namespace ear {
+namespace {
+
+constexpr double kTakeoffVelocity = 0.05;  // [m/s] chosen: what the wheels were wrong by before a take-off was noticed
+constexpr double kTakeoffPosition = 5e-3;  // [m] what came of it
+constexpr double kGapAccel = 1.0;          // [m/s^2] chosen: while nothing was measured
+constexpr double kGapRate = 0.3;           // [rad/s] chosen: the same
+
+}  // namespace
+
+Sources::Sources(const FilterConfig& config, const Calibration& calibration)
+    : imu_(calibration.imu),
+      normal_walk_(0.0),
+      ground_(config, calibration),
+      cameras_(config, calibration),
+      standstill_(config.standstill, focal_length(calibration), config.window) {
+  if (!calibration.encoder || config.odometer.model == OdometerModel::none) return;
+  const bool sees_ground = calibration.lasers && !calibration.lasers->beams.empty();
+  wheels_.emplace(config.odometer, calibration, sees_ground);
+  normal_walk_ = config.odometer.normal_walk;
+}
+
+void Sources::inflate_after_takeoff(Ekf& ekf) {
+  ekf.inflate_motion(0.0, kTakeoffVelocity, kTakeoffPosition);
+  ekf.discard_bias_changes();
+}
+
+void Sources::look_at(const FeatureFrame& frame, TimeNs t_ns, const Ingest& ingest, const Ekf& ekf) {
+  cameras_.measure_noise(frame, ekf.state().camera);
+  const FeatureFrame nothing{frame.t_ns, {}};
+  const bool repeated = frame.repeated && ekf.running();  // a frozen image shows no standing
+  standstill_.update({repeated ? nothing : frame, t_ns, ingest.imu(),
+                      ekf.running() ? std::optional(ekf.state().imu.b_g) : std::nullopt, on_ground()});
+  ground_.set_gyro_bias(ekf.state().imu.b_g);
+}
+
+Displacements Sources::displacements(const FeatureFrame& frame, TimeNs t_ns, const Ingest& ingest, const Ekf& ekf) {
+  const ImuMotion motion = imu_motion(ekf.state().imu, ingest.imu(), t_ns, imu_);
+  Displacements result;
+  result[index_of(MotionSensor::imu)] = imu_displacement(motion, ekf.covariance());
+  if (wheels_ && on_ground() && ground_.rolls_at(ekf.state().imu.t_ns)) {
+    result[index_of(MotionSensor::odometer)] =
+        wheels_->displacement(ekf, ingest.increments(), ingest.imu(), t_ns, ground_.known());
+  }
+  result[index_of(MotionSensor::camera)] = cameras_.displacement(frame, t_ns, motion, ekf);
+  return result;
+}
+
+void Sources::advance(TimeNs t_ns, const Advice& advice, Ingest& ingest, Ekf& ekf, Records& records) {
+  while (const std::optional<Measurement> z = ingest.next(t_ns)) {
+    propagate(z->t_ns, advice, ingest, ekf);
+    const bool bridge_ahead =
+        cameras_.count() > 1 && cameras_.last_image() && ingest.interruption().waits_for_images(ekf.state().imu.t_ns);
+    if (bridge_ahead) continue;
+    if (!z->increment) {
+      ground_.update(z->ranges, ingest.imu(), camera_update_, ekf, records);
+    } else if (on_ground() && ground_.rolls_at(z->increment->from_ns)) {
+      wheels_->update(*z->increment, {ingest.imu(), ground_.known(), advice.of(MotionSensor::odometer), camera_update_},
+                      ekf, records);
+    }
+  }
+  propagate(t_ns, advice, ingest, ekf);
+}
+
+/// Where samples are missing, they may be lost, or the clock jumped: the vehicle went on meanwhile, or it did not.
+void Sources::propagate(TimeNs t_ns, const Advice& advice, Ingest& ingest, Ekf& ekf) const {
+  if (t_ns <= ekf.state().imu.t_ns) return;
+  ImuInterruption& interruption = ingest.interruption();
+  const std::optional<TimeNs> uncertain_ns =
+      ekf.propagate(ingest.imu(), t_ns, {advice.of(MotionSensor::imu), interruption.gap_from(), normal_walk_});
+  if (uncertain_ns) interruption.add_uncertain(*uncertain_ns);
+  const double unseen = interruption.take_unseen(t_ns);
+  if (unseen > 0.0) {
+    ekf.inflate_motion(unseen * std::hypot(ekf.rate_B().norm(), kGapRate), kGapAccel * unseen,
+                       unseen * ekf.state().imu.v_W.norm());
+  }
+}
+
+FrameAgreement Sources::check(const FeatureFrame& frame, Ingest& ingest, Ekf& ekf) {
+  if (ingest.interruption().take_uncertain() && cameras_.bridge(frame, ekf)) {
+    camera_update_ = CameraUpdate::considered;
+    ingest.interruption().set_bridged(ekf.state().imu.t_ns);
+  }
+  return cameras_.compare(frame, ekf);
+}
+
+void Sources::use_image(const FeatureFrame& frame, bool stands, const Advice& advice, Ekf& ekf, Records& records) {
+  if (stands && standstill_.clone_is_here()) {
+    hold(ekf, records);
+  } else {
+    camera_update_ = advice.cameras_sound ? CameraUpdate::learned : CameraUpdate::considered;
+    standstill_.set_clone_here(true);
+    cameras_.update(frame, advice.of(MotionSensor::camera), camera_update_, ekf, records);
+  }
+  records.statistics.clones = static_cast<int>(ekf.state().clones.size());
+}
+
+void Sources::go_without_image(const Advice& advice, Ekf& ekf, Records& records) {
+  if (standstill_.stands() && standstill_.clone_is_here()) {
+    hold(ekf, records);
+  } else if (standstill_.stands()) {
+    camera_update_ = advice.cameras_sound ? CameraUpdate::learned : CameraUpdate::considered;
+    standstill_.set_clone_here(true);
+    cameras_.clone_without_image(advice.of(MotionSensor::camera), ekf);
+  } else {
+    standstill_.set_clone_here(false);
+  }
+  records.statistics.clones = static_cast<int>(ekf.state().clones.size());
+}
+
+void Sources::hold(Ekf& ekf, Records& records) {
+  camera_update_ = CameraUpdate::considered;
+  records.statistics.standing = true;
+  cameras_.set_updated(ekf.state().imu.t_ns);
+  standstill_.hold(ekf);
+}
+
+void Sources::reset() {
+  if (wheels_) wheels_->reset();
+  ground_.reset();
+  cameras_.reset();
+  standstill_.set_clone_here(false);
+}
+
+}  // namespace ear

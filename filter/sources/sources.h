@@ -1,0 +1,74 @@
+// All that updates the filter: wheels, ground, cameras and standstill, each at its own time. docs/filter.md.
+#pragma once
+
+#include <optional>
+
+#include "ear/calibration.h"
+#include "ear/filter_config.h"
+#include "filter/advice.h"
+#include "filter/ekf/displacement.h"
+#include "filter/ekf/ekf.h"
+#include "filter/ekf/records.h"
+#include "filter/ingest/ingest.h"
+#include "filter/sources/cameras/cameras.h"
+#include "filter/sources/ground/ground.h"
+#include "filter/sources/standstill/standstill.h"
+#include "filter/sources/wheels/wheels.h"
+
+namespace ear {
+
+class Sources {
+ public:
+  Sources(const FilterConfig& config, const Calibration& calibration);
+
+  /// Every sample, in time order: do the wheels leave the ground, or meet it? A take-off is noticed some centimetres
+  /// above the ground, and until then the wheels held the vehicle there.
+  template <typename Sample>
+  void watch_contact(const Sample& sample, Ekf& ekf) {
+    if (wheels_ && ground_.add(sample) == ContactEvent::takeoff && ekf.running()) inflate_after_takeoff(ekf);
+  }
+
+  /// A frame at `t_ns` (IMU time), before anything is done with it: how exact it is, and whether the vehicle stands.
+  void look_at(const FeatureFrame& frame, TimeNs t_ns, const Ingest& ingest, const Ekf& ekf);
+  /// p^I, p^o and p^c of (13), from the state to `t_ns`, each by one sensor alone.
+  [[nodiscard]] Displacements displacements(const FeatureFrame& frame, TimeNs t_ns, const Ingest& ingest,
+                                            const Ekf& ekf);
+  /// Propagates to `t_ns`, with wheels (5)-(8) and lasers (2)-(4) on the way: each at its own time, or, if the state
+  /// has passed that already, where the state was then.
+  void advance(TimeNs t_ns, const Advice& advice, Ingest& ingest, Ekf& ekf, Records& records);
+  /// The same without wheels and lasers.
+  void propagate(TimeNs t_ns, const Advice& advice, Ingest& ingest, Ekf& ekf) const;
+  /// With the state at the frame's time: does the frame show the motion that the others predict?
+  [[nodiscard]] FrameAgreement check(const FeatureFrame& frame, Ingest& ingest, Ekf& ekf);
+  /// The frame updates the state. `stands`: the vehicle does, and is held where it is.
+  void use_image(const FeatureFrame& frame, bool stands, const Advice& advice, Ekf& ekf, Records& records);
+  /// The same at a frame's time, without the image.
+  void go_without_image(const Advice& advice, Ekf& ekf, Records& records);
+
+  /// The state begins anew. What was seen of contact and standing stays.
+  void reset();
+
+  [[nodiscard]] bool uses_wheels() const { return wheels_.has_value(); }
+  [[nodiscard]] bool on_ground() const { return wheels_ && ground_.carries(); }
+  [[nodiscard]] const std::optional<Wheels>& wheels() const { return wheels_; }
+  [[nodiscard]] Ground& ground() { return ground_; }
+  [[nodiscard]] const Ground& ground() const { return ground_; }
+  [[nodiscard]] Cameras& cameras() { return cameras_; }
+  [[nodiscard]] const Cameras& cameras() const { return cameras_; }
+  [[nodiscard]] Standstill& standstill() { return standstill_; }
+
+ private:
+  static void inflate_after_takeoff(Ekf& ekf);
+  void hold(Ekf& ekf, Records& records);
+
+  ImuCalibration imu_;
+  double normal_walk_;  ///< [rad/sqrt(m)]; 0 without wheels
+  std::optional<Wheels> wheels_;
+  Ground ground_;
+  Cameras cameras_;
+  Standstill standstill_;
+  /// Standing and bridges show nothing of the cameras' calibration, images that are sound do.
+  CameraUpdate camera_update_ = CameraUpdate::considered;
+};
+
+}  // namespace ear

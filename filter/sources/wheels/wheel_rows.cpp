@@ -1,0 +1,81 @@
+#include "filter/sources/wheels/wheel_rows.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace ear {
+
+void WheelRows::take_one_wheel(double lever) {
+  residual(speed) += lever * residual(yaw_rate);
+  H.row(speed) += lever * H.row(yaw_rate);
+  H(speed, ground_column(err::track_width)) -= lever * residual(yaw_rate);  // the lever grows with it
+  J_gyro.row(speed) += lever * J_gyro.row(yaw_rate);
+}
+
+WheelRows linearize_wheels(const State& x, const Eigen::Matrix3d& R_WB, const Eigen::Vector3d& v_W,
+                           const WheelIncrement& turn, const Eigen::Vector3d& gyro_B, OdometerModel model,
+                           bool normal_known) {
+  using Eigen::Vector3d;
+  const OdometerState& odometer = x.odometer;
+  const bool terrain = model == OdometerModel::terrain;
+  const bool on_plane = terrain && normal_known;
+  const Eigen::Matrix3d& R_BO = odometer.T_BO.R;
+  const Vector3d rate = gyro_B - x.imu.b_g;
+  const Vector3d v_O = R_WB.transpose() * v_W + rate.cross(odometer.T_BO.p);
+  const Vector3d y = R_BO.col(1);
+  const Vector3d n = on_plane ? Vector3d(R_WB.transpose() * x.ground.n_W) : Vector3d(R_BO.col(2));
+  const Vector3d along = y.cross(n);
+  const Vector3d f = along.normalized();
+  const Eigen::Vector2d wheel = odometer.wheel_radius.cwiseProduct(turn.angle) / turn.duration();  // rim speeds
+  const double r = odometer.wheel_radius.mean();
+
+  WheelRows rows;
+  rows.wheel_speed = wheel.mean() + (terrain ? r * y.dot(rate) : 0.0);
+  const double turning = (wheel(1) - wheel(0)) / odometer.track_width;
+  rows.residual << rows.wheel_speed - f.dot(v_O), -y.dot(v_O), -n.dot(v_O), turning - n.dot(rate);
+
+  // Derivatives of y, n, f by the state's errors.
+  constexpr int nu = ground_column(err::nu), b_g = ground_column(err::b_g), normal = ground_column(err::normal);
+  constexpr int radius = ground_column(err::wheel_radius), track_width = ground_column(err::track_width);
+  constexpr int phi = ground_column(err::odometer);
+  const Eigen::Matrix3d y_phi = -R_BO * skew(Vector3d::UnitY());
+  Eigen::Matrix3d n_phi = Eigen::Matrix3d::Zero();
+  Eigen::Matrix<double, 3, 2> n_delta = Eigen::Matrix<double, 3, 2>::Zero();
+  if (on_plane) {
+    n_delta = -skew(n) * R_WB.transpose() * tangent_basis(x.ground.n_W);
+  } else {
+    n_phi = -R_BO * skew(Vector3d::UnitZ());
+  }
+  const Eigen::Matrix3d unit = (Eigen::Matrix3d::Identity() - f * f.transpose()) / along.norm();
+  const Eigen::Matrix3d f_phi = unit * (skew(y) * n_phi - skew(n) * y_phi);
+  const Eigen::Matrix<double, 3, 2> f_delta = unit * skew(y) * n_delta;
+
+  // How the predictions move with v_O (by nu and by the rate), then with the directions, then with the wheels.
+  Eigen::Matrix<double, 3, 3> direction;
+  direction << f.transpose(), y.transpose(), n.transpose();
+  const Eigen::Matrix3d v_rate = -skew(odometer.T_BO.p);
+  rows.J_gyro.topRows<3>() = direction * v_rate;
+  rows.J_gyro.row(WheelRows::yaw_rate) = n.transpose();
+  if (terrain) rows.J_gyro.row(WheelRows::speed) -= r * y.transpose();
+
+  auto& H = rows.H;
+  H.middleCols<3>(nu).topRows<3>() = direction * R_WB.transpose();
+  H.middleCols<3>(b_g) = -rows.J_gyro;
+  H.block<1, 3>(WheelRows::speed, phi) = v_O.transpose() * f_phi;
+  H.block<1, 3>(WheelRows::side, phi) = v_O.transpose() * y_phi;
+  H.block<1, 3>(WheelRows::slope, phi) = v_O.transpose() * n_phi;
+  H.block<1, 3>(WheelRows::yaw_rate, phi) = rate.transpose() * n_phi;
+  H.block<1, 2>(WheelRows::speed, normal) = v_O.transpose() * f_delta;
+  H.block<1, 2>(WheelRows::slope, normal) = v_O.transpose() * n_delta;
+  H.block<1, 2>(WheelRows::yaw_rate, normal) = rate.transpose() * n_delta;
+  H.block<1, 2>(WheelRows::speed, radius) = -0.5 * wheel.transpose();
+  if (terrain) {
+    H.block<1, 2>(WheelRows::speed, radius) -= 0.5 * y.dot(rate) * odometer.wheel_radius.transpose();
+    H.block<1, 3>(WheelRows::speed, phi) -= r * rate.transpose() * y_phi;
+  }
+  H.block<1, 2>(WheelRows::yaw_rate, radius) << wheel(0) / odometer.track_width, -wheel(1) / odometer.track_width;
+  H(WheelRows::yaw_rate, track_width) = turning;
+  return rows;
+}
+
+}  // namespace ear

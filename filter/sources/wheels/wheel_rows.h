@@ -1,0 +1,38 @@
+// What the wheel encoders say about the body's velocity. The paper's (5)-(8); docs/filter.md, section 8.
+#pragma once
+
+#include <Eigen/Core>
+
+#include "ear/filter_config.h"
+#include "ear/types.h"
+#include "filter/ekf/state.h"
+#include "filter/ingest/wheel_increment.h"
+
+namespace ear {
+
+/// Rows of the odometer, linearized: each predicts zero, and residual = -prediction = H e + n.
+struct WheelRows {
+  static constexpr int speed = 0;     ///< along the ground, wheels against velocity [m/s]
+  static constexpr int side = 1;      ///< along the axle [m/s]
+  static constexpr int slope = 2;     ///< through the ground [m/s]
+  static constexpr int yaw_rate = 3;  ///< wheels against gyroscope [rad/s]
+  static constexpr int size = 4;
+
+  Eigen::Matrix<double, size, 1> residual;
+  Eigen::Matrix<double, size, kGroundColumns> H = Eigen::Matrix<double, size, kGroundColumns>::Zero();
+  Eigen::Matrix<double, size, 3> J_gyro;  ///< of the prediction by the measured rate
+  double wheel_speed = 0.0;               ///< forward speed that the wheels tell [m/s]
+
+  /// In place of the mean of both wheels, one of them and the gyroscope's yaw rate tell the speed. `lever`: where it
+  /// stands on the axle, half the track width; negative for the left one [m].
+  void take_one_wheel(double lever);
+};
+
+/// The odometer's rows at a state that is `v_W` and `R_WB` at the middle of the turn; `gyro_B`: mean measured rate over
+/// the turn, bias included. With OdometerModel::terrain: (5) with the body's pitch rate, direction along the ground
+/// (6)-(8); otherwise along the body, without it. `normal_known`: false without lasers: the ground is O's own xy-plane.
+[[nodiscard]] WheelRows linearize_wheels(const State& x, const Eigen::Matrix3d& R_WB, const Eigen::Vector3d& v_W,
+                                         const WheelIncrement& turn, const Eigen::Vector3d& gyro_B, OdometerModel model,
+                                         bool normal_known);
+
+}  // namespace ear

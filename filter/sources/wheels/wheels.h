@@ -1,0 +1,69 @@
+// The wheels as a source: an increment of the encoders becomes rows of the odometer (5)-(8), and updates the filter.
+// The rows: wheel_rows.h. docs/filter.md, "Wheels".
+#pragma once
+
+#include <array>
+#include <optional>
+
+#include "ear/calibration.h"
+#include "ear/filter_config.h"
+#include "filter/ekf/displacement.h"
+#include "filter/ekf/ekf.h"
+#include "filter/ekf/records.h"
+#include "filter/ingest/imu_buffer.h"
+#include "filter/sources/wheels/wheel_agreement.h"
+#include "filter/sources/wheels/wheel_rows.h"
+
+namespace ear {
+
+class Wheels {
+ public:
+  /// The calibration has an encoder. `sees_ground`: there are lasers.
+  Wheels(const OdometerConfig& config, const Calibration& calibration, bool sees_ground);
+
+  /// What an update needs to know beside the readings.
+  struct Context {
+    const ImuBuffer& imu;
+    bool ground_known = false;  ///< the lasers have seen the ground since it was last touched
+    double weight = 1.0;        ///< (15)
+    CameraUpdate calibration = CameraUpdate::considered;
+  };
+  /// The filter's state is near the middle of the increment.
+  void update(const WheelIncrement& increment, const Context& context, Ekf& ekf, Records& records);
+
+  /// p^o of (13): how far the body will have gone at `to_ns`. Not available without the ground's normal, if it counts.
+  [[nodiscard]] Displacement displacement(const Ekf& ekf, const WheelIncrements& increments, const ImuBuffer& imu,
+                                          TimeNs to_ns, bool ground_known) const;
+
+  /// Did the velocity not lie in the ground just now, as when the wheels leave the ground or meet it?
+  [[nodiscard]] bool lifting(TimeNs t_ns) const;
+
+  /// The state begins anew.
+  void reset() { running_ = Running{}; }
+
+ private:
+  using Sigmas = Eigen::Matrix<double, WheelRows::size, 1>;
+
+  [[nodiscard]] bool uses_plane() const { return config_.model == OdometerModel::terrain && sees_ground_; }
+  [[nodiscard]] Sigmas noise_of(const WheelRows& rows, const WheelIncrement& increment, const MeanRate& rate,
+                                const State& x) const;
+  void log(const WheelRows& rows, const Sigmas& sigma, TimeNs t_ns, const Ekf& ekf, InnovationLog& log) const;
+  [[nodiscard]] bool choose_wheel(WheelRows& rows, Sigmas& sigma, const WheelIncrement& increment, const Ekf& ekf,
+                                  FrameStatistics& statistics);
+
+  /// What the last increments have shown.
+  struct Running {
+    std::array<TimeNs, WheelRows::size> agrees_since_ns{};  ///< each row with the state; kDisagrees
+    std::array<TimeNs, 2> wheel_agrees_since_ns{};  ///< each wheel by itself with the state, while they contradict
+    WheelAgreement agreement;
+    std::optional<TimeNs> lifted_ns;  ///< when the velocity last did not lie in the ground
+  };
+
+  OdometerConfig config_;
+  EncoderCalibration encoder_;
+  ImuCalibration imu_;
+  bool sees_ground_;
+  Running running_;
+};
+
+}  // namespace ear

@@ -1,0 +1,75 @@
+#include "filter/start/map_alignment.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "filter/ekf/propagation.h"
+
+namespace ear {
+namespace {
+
+constexpr double kUnseenSpeed = 1.0;  // [m/s] chosen: that the vehicle may have gained since it was lost
+
+}  // namespace
+
+MapAlignment MapAlignment::join(const NavState& last_W, const NavState& state_A, double yaw_sigma,
+                                double position_sigma) {
+  const Eigen::Matrix3d D = (last_W.q_WB * state_A.q_WB.conjugate()).toRotationMatrix();
+  const double yaw = std::atan2(D(1, 0) - D(0, 1), D(0, 0) + D(1, 1));
+  MapAlignment alignment;
+  alignment.q_WA = Eigen::Quaterniond(Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()));
+  alignment.p_WA = last_W.p_WB - alignment.q_WA * state_A.p_WB;
+  alignment.start_A = state_A.p_WB;
+  alignment.yaw_sigma = yaw_sigma;
+  alignment.position_sigma = position_sigma;
+  return alignment;
+}
+
+NavState MapAlignment::to_world(const NavState& state_A) const {
+  NavState state = state_A;
+  state.q_WB = (q_WA * state_A.q_WB).normalized();
+  state.p_WB = q_WA * state_A.p_WB + p_WA;
+  state.v_W = q_WA * state_A.v_W;
+  return state;
+}
+
+/// A yaw error e of the alignment turns the vehicle, its velocity, and its way since the start, about z.
+Eigen::Matrix<double, estimate_error::size, estimate_error::size> MapAlignment::to_world(
+    const Eigen::Matrix<double, estimate_error::size, estimate_error::size>& covariance_A,
+    const NavState& state_A) const {
+  using namespace estimate_error;
+  const Eigen::Matrix3d R = q_WA.toRotationMatrix();
+  Eigen::Matrix<double, size, size> T = Eigen::Matrix<double, size, size>::Identity();
+  for (const int block : {rotation, velocity, position}) T.block<3, 3>(block, block) = R;
+  Eigen::Matrix<double, size, 1> by_yaw = Eigen::Matrix<double, size, 1>::Zero();
+  by_yaw.segment<3>(rotation) = Eigen::Vector3d::UnitZ();
+  by_yaw.segment<3>(velocity) = Eigen::Vector3d::UnitZ().cross(R * state_A.v_W);
+  by_yaw.segment<3>(position) = Eigen::Vector3d::UnitZ().cross(R * (state_A.p_WB - start_A));
+  Eigen::Matrix<double, size, size> P = T * covariance_A * T.transpose();
+  P += yaw_sigma * yaw_sigma * by_yaw * by_yaw.transpose();
+  P.diagonal().segment<3>(position).array() += position_sigma * position_sigma;
+  return P;
+}
+
+MapAlignment align_after_restart(const Estimate& last_good, const ImuState& x, const ImuBuffer& imu,
+                                 double gyro_noise) {
+  NavState last = last_good.state;
+  const auto variance = last_good.covariance.diagonal().cwiseMax(0.0);
+  const TimeNs from_ns = std::min(last.t_ns, x.t_ns);
+  const TimeNs to_ns = std::max(last.t_ns, x.t_ns);
+  const double since = seconds_between(from_ns, to_ns);
+  double yaw_variance = variance(estimate_error::rotation + 2);
+  if (imu[0].t_ns <= from_ns) {
+    const Eigen::Matrix3d turned = gyro_rotation(from_ns, to_ns, last.b_g, imu);
+    last.q_WB = last.q_WB * Eigen::Quaterniond(last.t_ns <= x.t_ns ? turned : Eigen::Matrix3d(turned.transpose()));
+    yaw_variance +=
+        since * since * variance.segment<3>(estimate_error::gyro_bias).maxCoeff() + since * gyro_noise * gyro_noise;
+  } else {
+    yaw_variance = M_PI * M_PI / 3.0;
+  }
+  const double path = since * (last.v_W.norm() + kUnseenSpeed);
+  const double position_sigma = std::sqrt(variance.segment<3>(estimate_error::position).maxCoeff() + path * path);
+  return MapAlignment::join(last, nav_state(x), std::sqrt(yaw_variance), position_sigma);
+}
+
+}  // namespace ear

@@ -1,0 +1,160 @@
+#include "filter/start/moving_start.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "filter/ekf/so3.h"
+#include "filter/start/known_gravity.h"
+
+namespace ear {
+namespace {
+
+constexpr double kSpan = 1.5;  // [s] of frames that it takes
+constexpr std::size_t kFewestFrames = 8;
+constexpr double kLongestStep = 0.35;    // [s] between two frames
+constexpr double kScaleSigma = 0.02;     // of a way: noise of the disparities makes points too near or too far
+constexpr double kWaySigma = 1e-3;       // [m]
+constexpr double kAccelSigma = 0.3;      // [m/s^2] what a poor accelerometer may be off between two frames
+constexpr double kRotationSigma = 2e-3;  // [rad] of a rotation from the cameras
+constexpr double kWorstGravity = 0.7;    // [m/s^2] by which the cameras alone may miss it
+constexpr double kWorstFit = 2.5;        // root mean square residual, in standard deviations
+
+// Unknowns: velocity and gravity in the first body frame, bias of the accelerometer.
+constexpr int kV = 0, kG = 3, kBa = 6, kUnknowns = 9;
+using Vector = Eigen::Matrix<double, kUnknowns, 1>;
+using Matrix = Eigen::Matrix<double, kUnknowns, kUnknowns>;
+
+/// What the inertial samples add up to since the first moment, in the body frame of then.
+struct Sums {
+  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  // integral of R f
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();  // its integral
+  Eigen::Matrix3d velocity_by_b_a = Eigen::Matrix3d::Zero();
+  Eigen::Matrix3d position_by_b_a = Eigen::Matrix3d::Zero();
+
+  void add(const Eigen::Vector3d& rate_B, const Eigen::Vector3d& accel_B, double dt) {
+    const Eigen::Matrix3d middle = R * exp_so3(0.5 * dt * rate_B);
+    const Eigen::Vector3d force = middle * accel_B;
+    position += dt * velocity + 0.5 * dt * dt * force;
+    velocity += dt * force;
+    position_by_b_a += dt * velocity_by_b_a - 0.5 * dt * dt * middle;
+    velocity_by_b_a -= dt * middle;
+    R = R * exp_so3(dt * rate_B);
+  }
+};
+
+/// The same image twice: no two exposures are exactly equal, and nothing says how the vehicle moves.
+bool frozen(const std::vector<StereoMatch>& matches) {
+  return std::all_of(matches.begin(), matches.end(), [](const StereoMatch& m) { return m.left0 == m.left1; });
+}
+
+Eigen::Matrix3d rotation_between(const ImuBuffer& imu, TimeNs from_ns, TimeNs to_ns) {
+  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
+  imu.for_each_piece(from_ns, to_ns, [&](const Eigen::Vector3d& gyro_B, const Eigen::Vector3d&, double dt) {
+    R = R * exp_so3(gyro_B * dt);
+  });
+  return R;
+}
+
+}  // namespace
+
+void MovingStart::add(TimeNs t_ns, const FeatureFrame& frame, const ImuBuffer& imu, const CameraState& cameras) {
+  const bool first = frames_.empty();
+  if (first && (imu.empty() || imu[0].t_ns > t_ns)) return;
+  TimedFrame next{t_ns, frame, StereoMotion{}};
+  if (!first) {
+    const TimedFrame& last = frames_.back();
+    const std::vector<StereoMatch>& matches = matches_.find(last.features, frame);
+    StereoMotion start;
+    start.R_B0B1 = rotation_between(imu, last.t_ns, t_ns);
+    const double dt = seconds_between(last.t_ns, t_ns);
+    start.p_B0B1 = path_to(t_ns).value_or(Eigen::Vector3d::Zero());
+    const std::optional<StereoMotion> motion = stereo_motion(matches, cameras, start, noise_.feature);
+    if (motion && dt < kLongestStep && !frozen(matches)) {
+      next.motion = *motion;
+    } else {
+      frames_.clear();
+    }
+  }
+  frames_.push_back(std::move(next));
+  const auto enough_without_first = [&] {
+    return frames_.size() > kFewestFrames && seconds_between(frames_[1].t_ns, t_ns) >= kSpan;
+  };
+  while (enough_without_first()) frames_.erase(frames_.begin());
+}
+
+std::optional<Eigen::Vector3d> MovingStart::path_to(TimeNs t_ns) const {
+  if (frames_.size() < 2) return std::nullopt;
+  const TimedFrame& last = frames_.back();
+  const double share = seconds_between(last.t_ns, t_ns) / seconds_between(frames_[frames_.size() - 2].t_ns, last.t_ns);
+  return Eigen::Vector3d(share * (last.motion.R_B0B1.transpose() * last.motion.p_B0B1));
+}
+
+/// What turns the gyroscope's rotation into that of the cameras.
+Eigen::Vector3d MovingStart::gyro_bias(const ImuBuffer& imu) const {
+  double weight = 1.0 / (noise_.gyro_bias * noise_.gyro_bias);
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (std::size_t k = 1; k < frames_.size(); ++k) {
+    const double dt = seconds_between(frames_[k - 1].t_ns, frames_[k].t_ns);
+    const Eigen::Matrix3d R = rotation_between(imu, frames_[k - 1].t_ns, frames_[k].t_ns);
+    const double information = dt * dt / (kRotationSigma * kRotationSigma);
+    sum -= information / dt * log_so3(R.transpose() * frames_[k].motion.R_B0B1);
+    weight += information;
+  }
+  return sum / weight;
+}
+
+std::optional<ImuState> MovingStart::solve(const ImuBuffer& imu) const {
+  if (frames_.size() < kFewestFrames || seconds_between(frames_.front().t_ns, frames_.back().t_ns) < kSpan) {
+    return std::nullopt;
+  }
+  const Eigen::Vector3d b_g = gyro_bias(imu);
+  const TimeNs start_ns = frames_.front().t_ns;
+  Matrix A = Matrix::Zero();
+  Vector b = Vector::Zero();
+  double cost = 0.0;
+  A.diagonal().segment<3>(kBa).setConstant(1.0 / (noise_.accel_bias * noise_.accel_bias));
+  Sums sums;
+  for (std::size_t k = 1; k < frames_.size(); ++k) {
+    const TimeNs from_ns = frames_[k - 1].t_ns;
+    const TimeNs to_ns = frames_[k].t_ns;
+    const Sums before = sums;
+    imu.for_each_piece(from_ns, to_ns, [&](const Eigen::Vector3d& gyro_B, const Eigen::Vector3d& accel_B, double dt) {
+      sums.add(gyro_B - b_g, accel_B, dt);
+    });
+    const double t0 = seconds_between(start_ns, from_ns);
+    const double t1 = seconds_between(start_ns, to_ns);
+    const StereoMotion& motion = frames_[k].motion;
+    Eigen::Matrix<double, 3, kUnknowns> H;
+    H.middleCols<3>(kV) = (t1 - t0) * Eigen::Matrix3d::Identity();
+    H.middleCols<3>(kG) = 0.5 * (t1 * t1 - t0 * t0) * Eigen::Matrix3d::Identity();
+    H.middleCols<3>(kBa) = sums.position_by_b_a - before.position_by_b_a;
+    const Eigen::Vector3d z = before.R * motion.p_B0B1 - (sums.position - before.position);
+    const double way = kScaleSigma * motion.p_B0B1.norm();
+    const double unsteady = kAccelSigma * (t1 - t0) * (t1 - t0);
+    const double variance = motion.covariance.trace() / 3.0 + kWaySigma * kWaySigma + way * way + unsteady * unsteady;
+    A += H.transpose() * H / variance;
+    b += H.transpose() * z / variance;
+    cost += z.squaredNorm() / variance;
+  }
+
+  // Gravity as the cameras alone see it must have about its known size.
+  const Vector unbound = A.ldlt().solve(b);
+  const double miss = std::abs(unbound.segment<3>(kG).norm() + kGravity_W.z());
+  if (!(miss < kWorstGravity)) return std::nullopt;
+  const Vector x = solve_with_known_gravity(A, b, kG);
+  const double fit = x.dot(A * x) - 2.0 * b.dot(x) + cost;
+  const auto rows = 3.0 * static_cast<double>(frames_.size() - 1);
+  if (!(fit <= kWorstFit * kWorstFit * rows)) return std::nullopt;
+
+  ImuState state;
+  state.t_ns = start_ns;
+  state.R_WB = Eigen::Quaterniond::FromTwoVectors(x.segment<3>(kG), kGravity_W).toRotationMatrix();
+  state.v_W = state.R_WB * x.segment<3>(kV);
+  state.b_g = b_g;
+  state.b_a = x.segment<3>(kBa);
+  return state;
+}
+
+}  // namespace ear

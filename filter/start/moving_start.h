@@ -1,0 +1,57 @@
+// Where a filter may begin in a vehicle that moves, in the air or without wheels: velocity, gravity and biases that
+// explain what two cameras and the inertial samples saw over the last second or two. docs/filter.md, section 13.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "ear/types.h"
+#include "filter/ekf/state.h"
+#include "filter/ingest/imu_buffer.h"
+#include "filter/sources/cameras/stereo_motion.h"
+
+namespace ear {
+
+/// Standard deviations of what is not known before, and of one observation.
+struct MovingStartNoise {
+  double gyro_bias = 0.1;    ///< [rad/s]
+  double accel_bias = 0.05;  ///< [m/s^2]
+  double feature = 1e-3;     ///< one observation, normalized
+};
+
+/// Keeps the frames of the last seconds, and how the vehicle moved between them.
+class MovingStart {
+ public:
+  explicit MovingStart(const MovingStartNoise& noise) : noise_(noise) {}
+
+  struct TimedFrame {
+    TimeNs t_ns = 0;  ///< IMU time
+    FeatureFrame features;
+    StereoMotion motion;  ///< from the frame before; unused for the first
+  };
+
+  /// The next frame, at IMU time `t_ns`. Where its motion cannot be told, what came before is forgotten.
+  void add(TimeNs t_ns, const FeatureFrame& frame, const ImuBuffer& imu, const CameraState& cameras);
+
+  /// A state at the first frame kept; nothing while the frames span too little, or contradict the inertial samples.
+  /// Least squares over the velocity v and gravity g of that moment, in the body as it then was (B), and the biases:
+  ///   p_k+1 - p_k = v dt + g (t_k+1^2 - t_k^2) / 2 + double integral of R f          p_k: from the cameras
+  /// It is a point to linearize at, not an estimate: the frames may be used again.
+  [[nodiscard]] std::optional<ImuState> solve(const ImuBuffer& imu) const;
+
+  /// The way from the last frame to IMU time `t_ns`, in the body as it was then, at the speed before. Nothing before
+  /// two frames.
+  [[nodiscard]] std::optional<Eigen::Vector3d> path_to(TimeNs t_ns) const;
+
+  [[nodiscard]] const std::vector<TimedFrame>& frames() const { return frames_; }
+  void clear() { frames_.clear(); }
+
+ private:
+  [[nodiscard]] Eigen::Vector3d gyro_bias(const ImuBuffer& imu) const;
+
+  MovingStartNoise noise_;
+  std::vector<TimedFrame> frames_;  ///< oldest first
+  StereoMatches matches_;
+};
+
+}  // namespace ear

@@ -1,0 +1,94 @@
+#include "filter/start/rolling_start.h"
+
+#include <cmath>
+
+#include "filter/start/known_gravity.h"
+
+namespace ear {
+namespace {
+
+constexpr double kLongestTurn = 0.1;      // [s] between two readings
+constexpr double kSpeedSigma = 0.02;      // [m/s]
+constexpr double kDirectionSigma = 0.05;  // [rad] of the velocity in the body: it pitches about the axle
+constexpr double kWorstFit = 2.0;         // root mean square residual, in standard deviations
+
+// Unknowns: velocity and gravity in the first body frame, biases.
+constexpr int kV = 0, kG = 3, kBg = 6, kBa = 9, kUnknowns = 12;
+using Vector = Eigen::Matrix<double, kUnknowns, 1>;
+using Matrix = Eigen::Matrix<double, kUnknowns, kUnknowns>;
+
+/// What the inertial samples add up to since the first moment, in the body frame of then.
+struct Sums {
+  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d gained = Eigen::Vector3d::Zero();         // integral of R f
+  Eigen::Matrix3d R_integral = Eigen::Matrix3d::Zero();     // integral of R
+  Eigen::Matrix3d gained_by_b_g = Eigen::Matrix3d::Zero();  // derivative of `gained`
+
+  void add(const Eigen::Vector3d& gyro_B, const Eigen::Vector3d& accel_B, double dt) {
+    const Eigen::Matrix3d middle = R * exp_so3(0.5 * dt * gyro_B);
+    R_integral += 0.5 * dt * middle;
+    gained += dt * middle * accel_B;
+    gained_by_b_g += dt * skew(middle * accel_B) * R_integral;
+    R_integral += 0.5 * dt * middle;
+    R = R * exp_so3(dt * gyro_B);
+  }
+};
+
+}  // namespace
+
+std::optional<ImuState> rolling_start(const ImuBuffer& imu, const Ring<WheelIncrement>& turns,
+                                      const OdometerState& odometer, const RollingStartNoise& noise,
+                                      double min_duration) {
+  if (turns.empty()) return std::nullopt;
+  const TimeNs start_ns = turns.front().from_ns;
+  if (imu.empty() || imu[0].t_ns > start_ns) return std::nullopt;
+
+  Matrix A = Matrix::Zero();
+  Vector b = Vector::Zero();
+  double cost = 0.0;
+  A.diagonal().segment<3>(kBg).setConstant(1.0 / (noise.gyro_bias * noise.gyro_bias));
+  A.diagonal().segment<3>(kBa).setConstant(1.0 / (noise.accel_bias * noise.accel_bias));
+  Sums sums;
+  TimeNs now_ns = start_ns;
+  for (std::size_t k = 0; k < turns.size(); ++k) {
+    const WheelIncrement& turn = turns[k];
+    if (turn.duration() > kLongestTurn || (k > 0 && turn.from_ns != turns[k - 1].to_ns)) return std::nullopt;
+    const TimeNs middle_ns = turn.from_ns + (turn.to_ns - turn.from_ns) / 2;
+    Eigen::Vector3d rate = Eigen::Vector3d::Zero();
+    imu.for_each_piece(now_ns, middle_ns,
+                       [&](const Eigen::Vector3d& gyro_B, const Eigen::Vector3d& accel_B, double dt) {
+                         sums.add(gyro_B, accel_B, dt);
+                         rate = gyro_B;
+                       });
+    now_ns = middle_ns;
+    const Eigen::Matrix3d& R_BO = odometer.T_BO.R;
+    const double speed = odometer.wheel_radius.dot(turn.angle) / (2.0 * turn.duration()) +
+                         odometer.wheel_radius.mean() * R_BO.col(1).dot(rate);
+    const Eigen::Vector3d u = sums.R * (speed * R_BO.col(0) - rate.cross(odometer.T_BO.p));
+    Eigen::Matrix<double, 3, kUnknowns> H;
+    H.middleCols<3>(kV).setIdentity();
+    H.middleCols<3>(kG) = seconds_between(start_ns, middle_ns) * Eigen::Matrix3d::Identity();
+    H.middleCols<3>(kBg) = sums.gained_by_b_g - skew(u) * sums.R_integral;
+    H.middleCols<3>(kBa) = -sums.R_integral;
+    const Eigen::Vector3d z = u - sums.gained;
+    const double sigma = std::hypot(kSpeedSigma, kDirectionSigma * speed);
+    A += H.transpose() * H / (sigma * sigma);
+    b += H.transpose() * z / (sigma * sigma);
+    cost += z.squaredNorm() / (sigma * sigma);
+  }
+  if (seconds_between(start_ns, turns.back().to_ns) < min_duration) return std::nullopt;
+
+  const Vector x = solve_with_known_gravity(A, b, kG);
+  const double fit = x.dot(A * x) - 2.0 * b.dot(x) + cost;
+  if (!(fit <= 3.0 * kWorstFit * kWorstFit * static_cast<double>(turns.size()))) return std::nullopt;
+
+  ImuState state;
+  state.t_ns = start_ns;
+  state.R_WB = Eigen::Quaterniond::FromTwoVectors(x.segment<3>(kG), kGravity_W).toRotationMatrix();
+  state.v_W = state.R_WB * x.segment<3>(kV);
+  state.b_g = x.segment<3>(kBg);
+  state.b_a = x.segment<3>(kBa);
+  return state;
+}
+
+}  // namespace ear

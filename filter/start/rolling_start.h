@@ -1,0 +1,29 @@
+// Where a filter may begin on a vehicle that already rolls: attitude, velocity and biases that explain what gyroscope,
+// accelerometer and wheels read over the last second or two. docs/filter.md, section 9.
+#pragma once
+
+#include <optional>
+
+#include "filter/ekf/state.h"
+#include "filter/ingest/imu_buffer.h"
+#include "filter/ingest/ring.h"
+#include "filter/ingest/wheel_increment.h"
+
+namespace ear {
+
+/// Standard deviations of what is not known before, and of what the wheels tell.
+struct RollingStartNoise {
+  double gyro_bias = 0.1;    ///< [rad/s]
+  double accel_bias = 0.05;  ///< [m/s^2]
+};
+
+/// A state at the start of the first of `turns`. Least squares over the velocity v and gravity g of that moment, in the
+/// body as it then was (B), and the biases:
+///   R_Bk u_k = v + g t_k + integral of R f,      u_k: the body's velocity that the wheels tell, along the odometer's x
+/// It is a point to linearize at, not an estimate: the samples may be used again. Nothing if the turns have gaps, span
+/// less than `min_duration` [s], or contradict the inertial samples, as they do in the air or on slipping wheels.
+[[nodiscard]] std::optional<ImuState> rolling_start(const ImuBuffer& imu, const Ring<WheelIncrement>& turns,
+                                                    const OdometerState& odometer, const RollingStartNoise& noise,
+                                                    double min_duration);
+
+}  // namespace ear

@@ -1,0 +1,70 @@
+// Where the filter begins: standing, rolling, or in motion with two cameras. Each gives a start state, or nothing.
+// docs/filter.md, "Starts".
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+
+#include "ear/calibration.h"
+#include "ear/filter_config.h"
+#include "filter/advice.h"
+#include "filter/ekf/ekf.h"
+#include "filter/ekf/records.h"
+#include "filter/ingest/ingest.h"
+#include "filter/sources/sources.h"
+#include "filter/start/map_alignment.h"
+#include "filter/start/moving_start.h"
+
+namespace ear {
+
+struct StartState {
+  ImuState x;
+  Eigen::VectorXd sigma;  ///< standard deviations of the whole error vector
+  /// What the mean samples show of attitude and biases, whitened: residual = H e + n, by the inertial part. No rows but
+  /// for a standing start.
+  Eigen::Matrix<double, Eigen::Dynamic, err::imu_size> H;
+  Eigen::VectorXd residual;
+  bool from_frames = false;  ///< in motion, at the first of the frames kept: all of them are to be taken in
+};
+
+class Start {
+ public:
+  Start(const FilterConfig& config, const Calibration& calibration);
+
+  /// The vehicle at a frame, without a state.
+  struct Situation {
+    const FeatureFrame& frame;
+    TimeNs t_ns = 0;  ///< IMU time
+    bool stands = false;
+    bool rolls = false;     ///< the wheels carry it
+    bool restarts = false;  ///< not the first start
+    CameraState cameras;
+  };
+  /// The first that can: standing, rolling, moving with two cameras.
+  [[nodiscard]] std::optional<StartState> find(const Situation& now, const ImuStatistics& recent, const Ingest& ingest);
+  /// In place of a state that the cameras contradict, of the frames since `frame` was first given: moving alone.
+  [[nodiscard]] std::optional<StartState> find_in_motion(const Situation& now, const Ingest& ingest, bool contradicted);
+  void forget_frames() { moving_.clear(); }
+
+  /// The filter begins there, and takes in the frames since; the last one is at hand, and not taken in here. Where the
+  /// world of the new state lies in that of the last good estimate, if there was one.
+  MapAlignment begin(const StartState& start, const std::optional<Estimate>& last_good, const Advice& advice,
+                     Ingest& ingest, Ekf& ekf, Sources& sources, Records& records);
+
+  /// How far the body goes from the last frame to `t_ns` (IMU time), in the body as it was then, if that is known [m].
+  [[nodiscard]] std::optional<Eigen::Vector3d> path_to(TimeNs t_ns) const { return moving_.path_to(t_ns); }
+  /// Nothing but the wheels' calibration gives a length: there is neither camera nor laser.
+  [[nodiscard]] bool scale_is_given() const;
+
+ private:
+  [[nodiscard]] std::optional<StartState> standing(TimeNs t_ns, const ImuStatistics& imu) const;
+  [[nodiscard]] bool uses_wheels() const;
+  [[nodiscard]] Eigen::VectorXd sigma() const;
+  [[nodiscard]] StartState in_motion(const ImuState& x) const;
+
+  FilterConfig config_;
+  Calibration calibration_;
+  MovingStart moving_;
+};
+
+}  // namespace ear

@@ -1,0 +1,70 @@
+// Two worlds of one vehicle, before and after a restart.
+#include <doctest/doctest.h>
+
+#include "filter/ekf/so3.h"
+#include "filter/start/map_alignment.h"
+
+using namespace ear;
+
+namespace {
+
+using Matrix = Eigen::Matrix<double, estimate_error::size, estimate_error::size>;
+
+NavState state(double yaw, const Eigen::Vector3d& p_WB, const Eigen::Vector3d& v_W) {
+  NavState x;
+  x.q_WB = Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()) * Eigen::AngleAxisd(0.2, Eigen::Vector3d::UnitX());
+  x.p_WB = p_WB;
+  x.v_W = v_W;
+  return x;
+}
+
+}  // namespace
+
+TEST_CASE("map_alignment: the vehicle is where it was last known to be") {
+  const NavState last_W = state(1.1, {4.0, -2.0, 0.5}, {1.0, 0.0, 0.0});
+  const NavState start_A = state(-0.4, {0.1, 0.2, 0.3}, {0.0, 0.5, 0.0});
+  const MapAlignment alignment = MapAlignment::join(last_W, start_A, 0.1, 0.2);
+  const NavState start_W = alignment.to_world(start_A);
+  CHECK(start_W.p_WB.isApprox(last_W.p_WB, 1e-12));
+  CHECK(start_W.q_WB.angularDistance(last_W.q_WB) < 1e-12);
+  CHECK(start_W.v_W.norm() == doctest::Approx(0.5));
+}
+
+TEST_CASE("map_alignment: gravity stays gravity, whatever the tilt before") {
+  NavState last_W = state(1.1, {4.0, -2.0, 0.5}, Eigen::Vector3d::Zero());
+  last_W.q_WB = last_W.q_WB * Eigen::Quaterniond(Eigen::AngleAxisd(0.5, Eigen::Vector3d::UnitY()));
+  const MapAlignment alignment =
+      MapAlignment::join(last_W, state(0.0, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()), 0.0, 0.0);
+  CHECK((alignment.q_WA * Eigen::Vector3d::UnitZ()).isApprox(Eigen::Vector3d::UnitZ(), 1e-12));
+}
+
+TEST_CASE("map_alignment: its own uncertainty is that of the place and, with the distance, of the yaw") {
+  const NavState last_W = state(0.0, {4.0, -2.0, 0.5}, Eigen::Vector3d::Zero());
+  const NavState start_A = state(0.7, {1.0, 0.0, 0.0}, Eigen::Vector3d::Zero());
+  const MapAlignment alignment = MapAlignment::join(last_W, start_A, 0.1, 0.3);
+  const Matrix at_start = alignment.to_world(Matrix::Zero(), start_A);
+  CHECK(at_start.block<3, 3>(estimate_error::position, estimate_error::position)
+            .isApprox(0.09 * Eigen::Matrix3d::Identity(), 1e-12));
+  CHECK(at_start(estimate_error::rotation + 2, estimate_error::rotation + 2) == doctest::Approx(0.01));
+  const NavState later_A = state(0.7, {1.0, 20.0, 0.0}, Eigen::Vector3d::Zero());
+  const Matrix later = alignment.to_world(Matrix::Zero(), later_A);
+  CHECK(later.block<3, 3>(estimate_error::position, estimate_error::position).trace() ==
+        doctest::Approx(3 * 0.09 + 4.0));  // 20 m times 0.1 rad
+}
+
+TEST_CASE("map_alignment: a yaw error moves what it says it moves") {
+  const NavState last_W = state(0.3, {4.0, -2.0, 0.5}, Eigen::Vector3d::Zero());
+  const NavState start_A = state(0.7, {1.0, 0.0, 0.0}, Eigen::Vector3d::Zero());
+  const NavState later_A = state(1.7, {3.0, 5.0, 1.0}, {1.0, -0.5, 0.2});
+  const MapAlignment alignment = MapAlignment::join(last_W, start_A, 1.0, 0.0);
+  const double e = 1e-6;
+  NavState turned_W = last_W;
+  turned_W.q_WB = Eigen::Quaterniond(Eigen::AngleAxisd(e, Eigen::Vector3d::UnitZ())) * last_W.q_WB;
+  const NavState a = alignment.to_world(later_A);
+  const NavState b = MapAlignment::join(turned_W, start_A, 1.0, 0.0).to_world(later_A);
+  Eigen::Matrix<double, estimate_error::size, 1> d = Eigen::Matrix<double, estimate_error::size, 1>::Zero();
+  d.segment<3>(estimate_error::rotation) = log_so3((b.q_WB * a.q_WB.conjugate()).toRotationMatrix()) / e;
+  d.segment<3>(estimate_error::velocity) = (b.v_W - a.v_W) / e;
+  d.segment<3>(estimate_error::position) = (b.p_WB - a.p_WB) / e;
+  CHECK((alignment.to_world(Matrix::Zero(), later_A) - d * d.transpose()).norm() < 1e-4);
+}
