@@ -49,6 +49,7 @@ std::optional<Estimate> Filter::process(const FeatureFrame& given) {
     if (!frame.repeated) seen = sources_.check(frame, ingest_, ekf_);
     seen.frozen = frame.repeated;
   }
+  seen.right_skipped = frame.right_skipped;
   const TimeNs t_ns = imu_time(frame.t_ns, ekf_.state().camera);
   const bool use_image = health_.check_image(seen, t_ns, ingest_.imu().newest().t_ns);
   if (ekf_.running()) {
@@ -183,8 +184,8 @@ void Filter::take_imu() {
     // Without frames for long, the state moves on before its samples are overwritten.
     const std::optional<TimeNs> due_ns = ingest_.imu_due();
     if (due_ns && ekf_.running()) sources_.propagate(*due_ns, Advice{}, ingest_, ekf_);
-    const ImuSpike spike = ingest_.store(*sample);
-    health_.report_imu_fault(spike.gyro, spike.accel, sample->t_ns);
+    const ImuFault fault = ingest_.store(*sample);
+    health_.report_imu_fault(fault.gyro, fault.accel, sample->t_ns);
     sources_.watch_contact(*sample, ekf_);
   }
   if (ingest_.imu_clock().take_correction()) health_.report_imu_fault(true, true, ingest_.imu().newest().t_ns);
@@ -211,11 +212,12 @@ void Filter::add_laser(const LaserSample& sample) {
   ingest_.imu_clock().observe(ImuClock::Stream::laser, sample.t_ns);
   take_imu();
   const Verdict verdict = ingest_.judge(sample, ekf_.time());
+  if (verdict == Verdict::accepted) sources_.watch_contact(sample, ekf_);
   if (!ingest_.imu().empty()) {
-    health_.add_laser(sample, verdict, *calibration_.lasers, ingest_.imu().newest().t_ns);
+    health_.add_laser(sample, verdict, *calibration_.lasers, sources_.ground().stuck_beams(),
+                      ingest_.imu().newest().t_ns);
   }
   if (verdict != Verdict::accepted) return;
-  sources_.watch_contact(sample, ekf_);
   if (const auto due_ns = ingest_.due_before(sample, ekf_.running())) {
     sources_.advance(*due_ns, Advice{}, ingest_, ekf_, records_);
   }

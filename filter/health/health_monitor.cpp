@@ -1,101 +1,46 @@
 #include "filter/health/health_monitor.h"
 
 #include <algorithm>
-#include <cmath>
 
 namespace ear {
 namespace {
 
-constexpr double kLongest = 0.25;    // [s] that one piece of evidence may count
-constexpr double kMajority = 0.5;    // of the measurements of a wheel or beam
-constexpr double kSomeOff = 0.1;     // of the features off their place: a camera is in doubt
-constexpr double kManyOff = 0.3;     // it carries the estimate no more
-constexpr double kMostOff = 0.5;     // and contradicts the state
-constexpr double kNoisy = 1.5;       // times the usual noise of a feature: as little
-constexpr double kFewStereo = 0.25;  // of the features: less are seen by the right camera
-constexpr int kFewTracks = 10;
-constexpr double kSparse = 0.4;         // of the usual number of features: less are seen
-constexpr double kTracksMemory = 20.0;  // [s]
-constexpr double kSilent = 0.12;        // [s] without a frame, and kMissedFrames of its intervals
-constexpr double kMissedFrames = 2.5;
-constexpr double kStale = 0.5;          // [s] after which what the last frame said holds no more
-constexpr double kTick = 0.03;          // [s] between two looks at silent sensors
-constexpr int kRepeated = 15;           // equal ranges in a row, while the vehicle moves: a beam that is stuck
-constexpr double kClippedAccel = 25.0;  // [m/s^2] equal values in a row beyond this are the end of a range
-constexpr double kClippedGyro = 6.0;    // [rad/s]
-constexpr double kTurnOff = 0.012;      // [rad/s] between gyroscope and cameras
-constexpr double kTurnSigmas = 4.0;
-constexpr double kTurnMemory = 0.25;    // [s]
-constexpr double kScatterMemory = 2.0;  // [s]
-constexpr double kMostScatter = 0.1;    // [rad/s]
-constexpr double kMisled = 1.5;         // [s] after wheels that did not fit
-constexpr int kStampsToKnow = 20;
-constexpr double kLongestDelay = 0.1;  // [s] that may be usual
-constexpr double kStampOff = 0.06;     // [s] off the usual
-constexpr double kStampSpreads = 6.0;
-constexpr double kStampMemory = 1000.0;  // stamps
-constexpr double kUnaided = 2.0;         // [s] that inertia alone may carry the estimate
-constexpr double kWorstVelocity = 1.0;   // [m/s] standard deviation of a velocity that is known,
+constexpr double kMajority = 0.5;        // of the measurements of a wheel or beam
+constexpr double kMostOff = 0.5;         // of the features off their place: the images contradict the state
+constexpr int kFewTracks = 10;           // chosen
+constexpr double kSilent = 0.12;         // [s] chosen: without a reading
+constexpr double kStale = 0.5;           // [s] chosen: after which what the last frame showed holds no more
+constexpr double kTick = 0.03;           // [s] chosen: between two looks at silent sensors
+constexpr double kUnaided = 2.0;         // [s] chosen: that inertia alone may carry the estimate
+constexpr double kWorstVelocity = 1.0;   // [m/s] chosen: standard deviation of a velocity that is known,
 constexpr double kWorstDirection = 0.2;  // [rad] or of its direction, if more: one that is fast need not know it better
-constexpr double kContradicted = 1.0;    // [s]
+constexpr double kContradicted = 1.0;    // [s] chosen
 
-/// Left and right exchanged: what both see lies behind them.
-bool crossed(const FrameAgreement& seen) { return seen.behind > kMajority; }
+constexpr int kFullQuality = 100;  // of a vehicle that stands; Health::quality
+constexpr int kWheelQuality = 40;
+constexpr int kTrackQuality = 2;  // for each feature
+constexpr int kInertialQuality = 10;
+constexpr int kDegradedQuality = 60;  // at most, where a sensor is missing
 
 }  // namespace
 
-void FaultState::add(bool wrong, TimeNs t_ns) {
-  const double dt = last_ns_ ? std::clamp(seconds_between(*last_ns_, t_ns), 0.0, kLongest) : 0.0;
-  last_ns_ = t_ns;
-  if (wrong && !suspected_) onset_ns_ = t_ns;
-  suspected_ = wrong || suspicion_ > 0.0;
-  suspicion_ = std::clamp(suspicion_ + (wrong ? dt / kFaultyAfter : -dt / kSoundAfter), 0.0, 1.0);
-  if (suspicion_ > 1.0 - 1e-9) sound_ = false;
-  if (suspicion_ <= 0.0 && !wrong) {
-    sound_ = true;
-    suspected_ = false;
-  }
-}
-
-void FaultState::report(TimeNs t_ns) {
-  if (!suspected_) onset_ns_ = t_ns;
-  suspected_ = true;
-  suspicion_ = 1.0;
-  sound_ = false;
-  last_ns_ = t_ns;
-}
-
-void FaultState::clear(TimeNs t_ns) {
-  suspicion_ = 0.0;
-  suspected_ = false;
-  sound_ = true;
-  last_ns_ = t_ns;
-}
-
-bool StampWatch::add(TimeNs stamp_ns, TimeNs imu_ns) {
-  const double ahead = seconds_between(imu_ns, stamp_ns);
-  if (count_ == 0) usual_ = std::clamp(ahead, -kLongestDelay, kLongestDelay);  // the first one may be false
-  const double off = std::abs(ahead - usual_);
-  const double share = std::max(1.0 / kStampMemory, 1.0 / (count_ + 1));
-  const bool unusual = count_ >= kStampsToKnow && off > std::max(kStampOff, kStampSpreads * spread_);
-  const double counted = std::min(off, kStampOff);  // what is usual changes slowly
-  usual_ += share * std::clamp(ahead - usual_, -counted, counted);
-  spread_ += share * (counted - spread_);
-  ++count_;
-  return unusual;
-}
-
 HealthMonitor::HealthMonitor(const Calibration& calibration, bool uses_wheels, bool uses_beams)
-    : cameras_(calibration.cameras.size()),
-      beams_(uses_beams && calibration.lasers ? calibration.lasers->beams.size() : 0),
-      wheels_(uses_wheels) {}
+    : beams_(uses_beams && calibration.lasers ? calibration.lasers->beams.size() : 0),
+      wheels_(uses_wheels),
+      images_(calibration.cameras.size()) {}
+
+const FaultState& HealthMonitor::fault_of(Source source) const {
+  if (source == Source::camera_left) return images_.left();
+  if (source == Source::camera_right) return images_.right();
+  return faults_[index_of(source)];
+}
 
 void HealthMonitor::report(std::initializer_list<Source> sources, TimeNs t_ns) {
-  for (const Source source : sources) fault_of(source).report(t_ns);
+  for (const Source source : sources) faults_[index_of(source)].report(t_ns);
 }
 
 void HealthMonitor::succeed(const HealthMonitor& before, TimeNs t_ns) {
-  started_ = before.started_;
+  life_.started = before.life_.started;
   health_.reset_counter = before.health_.reset_counter;
   report({Source::gyroscope, Source::accelerometer}, t_ns);
   decide(t_ns);
@@ -103,28 +48,19 @@ void HealthMonitor::succeed(const HealthMonitor& before, TimeNs t_ns) {
 }
 
 void HealthMonitor::add_refused_imu() {
-  if (!last_imu_) return;
-  report({Source::gyroscope, Source::accelerometer}, last_imu_->t_ns);
-  decide(last_imu_->t_ns);
+  if (!arrivals_.imu_ns) return;
+  report({Source::gyroscope, Source::accelerometer}, *arrivals_.imu_ns);
+  decide(*arrivals_.imu_ns);
 }
 
 void HealthMonitor::add_imu(const ImuSample& sample, double max_gap) {
   const TimeNs t_ns = sample.t_ns;
-  const bool gap = last_imu_ && seconds_between(last_imu_->t_ns, sample.t_ns) > max_gap;
-  if (gap) report({Source::gyroscope, Source::accelerometer}, t_ns);
-  if (last_imu_) {
-    const auto clipped = [](const Eigen::Vector3d& a, const Eigen::Vector3d& b, double least) {
-      for (int axis = 0; axis < 3; ++axis) {
-        if (a(axis) == b(axis) && std::abs(b(axis)) > least) return true;
-      }
-      return false;
-    };
-    if (clipped(last_imu_->gyro_B, sample.gyro_B, kClippedGyro)) report({Source::gyroscope}, t_ns);
-    if (clipped(last_imu_->accel_B, sample.accel_B, kClippedAccel)) report({Source::accelerometer}, t_ns);
+  if (arrivals_.imu_ns && seconds_between(*arrivals_.imu_ns, t_ns) > max_gap) {
+    report({Source::gyroscope, Source::accelerometer}, t_ns);
   }
-  last_imu_ = sample;
-  if (seconds_between(last_tick_ns_, t_ns) < kTick) return;
-  last_tick_ns_ = t_ns;
+  arrivals_.imu_ns = t_ns;
+  if (seconds_between(arrivals_.tick_ns, t_ns) < kTick) return;
+  arrivals_.tick_ns = t_ns;
   note_silence(t_ns);
 }
 
@@ -134,77 +70,61 @@ void HealthMonitor::report_imu_fault(bool gyro, bool accel, TimeNs t_ns) {
 }
 
 void HealthMonitor::report_camera_fault(TimeNs t_ns) {
-  report_image_fault(t_ns);
+  images_.report(t_ns);
   decide(t_ns);
 }
 
-void HealthMonitor::report_image_fault(TimeNs t_ns) {
-  for (std::size_t camera = 0; camera < cameras_; ++camera) faults_[camera].report(t_ns);
-  carrying_.report(t_ns);
-}
-
 void HealthMonitor::add_encoder(const EncoderSample& sample, Verdict verdict, TimeNs imu_ns) {
-  last_encoder_ns_ = imu_ns;
+  arrivals_.encoder_ns = imu_ns;
   if (verdict == Verdict::impossible || encoder_stamps_.add(sample.t_ns, imu_ns))
     report({Source::wheel_left, Source::wheel_right}, imu_ns);
 }
 
 void HealthMonitor::add_laser(const LaserSample& sample, Verdict verdict, const LaserCalibration& lasers,
-                              TimeNs imu_ns) {
-  last_laser_ns_ = imu_ns;
+                              const std::bitset<kMaxBeams>& stuck, TimeNs imu_ns) {
+  arrivals_.laser_ns = imu_ns;
   const bool unusual = verdict == Verdict::impossible || laser_stamps_.add(sample.t_ns, imu_ns);
+  const bool moves = health_.aiding != Aiding::standing;
   for (std::size_t beam = 0; beam < std::min(beams_, sample.range.size()); ++beam) {
     const double range = sample.range[beam];
     no_return_[beam] = !(range >= lasers.range_min && range <= lasers.range_max);
-    const bool moves = health_.aiding != Aiding::standing;
-    repeated_[beam] = !no_return_[beam] && range == last_range_[beam] && moves ? repeated_[beam] + 1 : 0;
-    last_range_[beam] = range;
-    if (unusual || repeated_[beam] >= kRepeated) fault_of(beam_source(beam)).report(imu_ns);
+    if (unusual || (stuck[beam] && moves && !no_return_[beam])) report({beam_source(beam)}, imu_ns);
   }
 }
 
 /// Whose clock is wrong? Where the inertial samples went on since the last refusal, it is not theirs.
 void HealthMonitor::add_refused_frame(TimeNs imu_ns) {
-  const bool imu_goes_on = last_refused_imu_ns_ && imu_ns > *last_refused_imu_ns_;
-  last_refused_imu_ns_ = imu_ns;
-  if (!imu_goes_on) {
-    report({Source::gyroscope, Source::accelerometer}, imu_ns);
+  const bool imu_goes_on = arrivals_.refused_imu_ns && imu_ns > *arrivals_.refused_imu_ns;
+  arrivals_.refused_imu_ns = imu_ns;
+  if (imu_goes_on) {
+    images_.report(imu_ns);
   } else {
-    report_camera_fault(imu_ns);
+    report({Source::gyroscope, Source::accelerometer}, imu_ns);
   }
   decide(imu_ns);
 }
 
-/// Sensors that say nothing are as little to be trusted as those that lie.
+/// Sensors that are silent count as little as those that are wrong.
 void HealthMonitor::note_silence(TimeNs t_ns) {
-  if (!last_frame_ns_ || images_come(t_ns)) return;
-  for (std::size_t camera = 0; camera < cameras_; ++camera) faults_[camera].add(true, t_ns);
-  carrying_.add(true, t_ns);
-  for (const Source source : {Source::gyroscope, Source::accelerometer}) fault_of(source).add(false, t_ns);
+  if (!images_.expected() || images_.come(t_ns)) return;
+  images_.add_silence(t_ns);
+  for (const Source source : {Source::gyroscope, Source::accelerometer}) faults_[index_of(source)].add(false, t_ns);
   decide(t_ns);
 }
 
 void HealthMonitor::add_frame(const Frame& frame, const std::array<SourceRecord, kSourceCount>& records) {
   const TimeNs t_ns = frame.t_ns;
   last_ = frame;
-  last_refused_imu_ns_.reset();
+  arrivals_.refused_imu_ns.reset();
   if (frame.image) {
-    if (last_frame_ns_) {
-      const double interval = std::min(seconds_between(*last_frame_ns_, t_ns), 0.5);
-      frame_interval_ += (frame_interval_ == 0.0 ? 1.0 : 0.1) * (interval - frame_interval_);
+    images_.add({t_ns, arrivals_.imu_ns.value_or(t_ns), frame.running, frame.agreement, frame.statistics});
+    if (frame.running && frame.possible && images_.interval() > 0.0) {
+      rotation_.add(frame.agreement, images_.interval(), frame.statistics.wheel_rows_rejected > 0, t_ns);
     }
-    last_frame_ns_ = t_ns;
-    last_arrival_ns_ = last_imu_ ? std::max(t_ns, last_imu_->t_ns) : t_ns;
-    judge_cameras(frame);
-    late_ = camera_stamps_unusual_ && !camera_stamps_wrong_ && frame.agreement.matches > 0 &&
-            frame.agreement.left < kManyOff;
-    if (camera_stamps_unusual_) report_image_fault(t_ns);
   }
-  judge_turn(frame);
   if (wheels_) judge_ground(frame, records);
-  for (const Source source : {Source::gyroscope, Source::accelerometer}) {
-    fault_of(source).add(source == Source::gyroscope && turns_otherwise_, t_ns);
-  }
+  faults_[index_of(Source::gyroscope)].add(rotation_.differs(), t_ns);
+  faults_[index_of(Source::accelerometer)].add(false, t_ns);
 
   health_.sources = records;
   health_.horizontal_sigma = frame.horizontal_sigma;
@@ -213,34 +133,7 @@ void HealthMonitor::add_frame(const Frame& frame, const std::array<SourceRecord,
   health_.quality = quality(frame);
 }
 
-bool HealthMonitor::check_image(const FrameAgreement& agreement, TimeNs t_ns, TimeNs newest_imu_ns) {
-  camera_stamps_unusual_ = camera_stamps_.add(t_ns, newest_imu_ns);
-  const bool elsewhere = agreement.matches > 0 && agreement.left > kManyOff;
-  camera_stamps_wrong_ = camera_stamps_unusual_ && (camera_stamps_wrong_ || elsewhere);
-  return !agreement.frozen && !crossed(agreement) && !camera_stamps_wrong_;
-}
-
-void HealthMonitor::judge_cameras(const Frame& frame) {
-  if (cameras_ == 0) return;
-  const TimeNs t_ns = frame.t_ns;
-  const FrameAgreement& seen = frame.agreement;
-  const bool known = frame.running && seen.matches > 0;
-  const int tracks = frame.statistics.tracks;
-  const bool blind = tracks < kFewTracks;
-  const bool poor = blind || tracks < kSparse * usual_tracks_ || seen.noise > kNoisy;
-  const double share = std::max(frame_interval_ / kTracksMemory, 1.0 / (1.0 + frames_counted_));
-  usual_tracks_ += share * (tracks - usual_tracks_);
-  ++frames_counted_;
-  carrying_.add(blind || (known && seen.left > kManyOff), t_ns);
-  fault_of(Source::camera_left).add(poor || (known && seen.left > kSomeOff), t_ns);
-  if (cameras_ == 2 && frame.right) {
-    const bool one_eyed = frame.statistics.stereo < kFewStereo * tracks;
-    fault_of(Source::camera_right).add(poor || one_eyed || (known && seen.right > kSomeOff), t_ns);
-  }
-  if (seen.frozen || crossed(seen)) report_image_fault(t_ns);
-}
-
-/// Wheels and beams have something to say on the ground only.
+/// Wheels and beams have something to show on the ground only.
 void HealthMonitor::judge_ground(const Frame& frame, const std::array<SourceRecord, kSourceCount>& records) {
   if (!frame.running || !frame.statistics.on_ground) {
     for (std::size_t i = index_of(Source::wheel_left); i < index_of(Source::gyroscope); ++i)
@@ -249,80 +142,65 @@ void HealthMonitor::judge_ground(const Frame& frame, const std::array<SourceReco
   }
   const auto judge = [&](Source source, bool silent) {
     const SourceRecord& record = records[index_of(source)];
-    const int heard = record.used + record.rejected;
-    if (heard > 0) {
-      fault_of(source).add(record.rejected > kMajority * heard, frame.t_ns);
+    const int measured = record.used + record.rejected;
+    FaultState& fault = faults_[index_of(source)];
+    if (measured > 0) {
+      fault.add(record.rejected > kMajority * measured, frame.t_ns);
     } else if (silent) {
-      fault_of(source).add(true, frame.t_ns);
+      fault.add(true, frame.t_ns);
     }
   };
-  const TimeNs now_ns = last_imu_ ? last_imu_->t_ns : frame.t_ns;
-  const bool no_reading = seconds_between(last_encoder_ns_, now_ns) > kSilent;
-  const bool no_range = seconds_between(last_laser_ns_, now_ns) > kSilent;
+  const TimeNs now_ns = arrivals_.imu_ns.value_or(frame.t_ns);
+  const bool no_reading = seconds_between(arrivals_.encoder_ns, now_ns) > kSilent;
+  const bool no_range = seconds_between(arrivals_.laser_ns, now_ns) > kSilent;
   if (!frame.lifted) {
     for (const Source wheel : {Source::wheel_left, Source::wheel_right}) judge(wheel, no_reading);
   }
   for (std::size_t beam = 0; beam < beams_; ++beam) judge(beam_source(beam), no_range || no_return_[beam]);
 }
 
-/// How the cameras turn against the gyroscope, over the last moments.
-void HealthMonitor::judge_turn(const Frame& frame) {
-  const FrameAgreement& seen = frame.agreement;
-  if (!frame.image || !frame.running || !frame.possible || frame_interval_ <= 0.0) return;
-  const double share = 1.0 - std::exp(-frame_interval_ / kTurnMemory);
-  // A velocity that wheels led astray looks like a turn as well.
-  if (frame.statistics.wheel_rows_rejected > 0) misled_ns_ = frame.t_ns;
-  const bool misled = misled_ns_ && seconds_between(*misled_ns_, frame.t_ns) < kMisled;
-  const bool known = !misled && seen.turn_sigma > 0.0 && seen.left < kManyOff && !seen.frozen;
-  const Eigen::Vector3d rate = known ? Eigen::Vector3d(seen.turn / frame_interval_) : Eigen::Vector3d::Zero();
-  // What the rates scatter, vibration and timing included, and what is left of it in their mean.
-  const double off = std::min((rate - turn_rate_).norm(), kMostScatter);
-  const double scatter_share = 1.0 - std::exp(-frame_interval_ / kScatterMemory);
-  turn_scatter_ += scatter_share * (off * off - turn_scatter_);
-  turn_rate_ += share * (rate - turn_rate_);
-  apparent_rate_ += share * (seen.apparent_rate - apparent_rate_);
-  const double by_chance = kTurnSigmas * std::sqrt(0.5 * share * turn_scatter_);
-  turns_otherwise_ = known && turn_rate_.norm() > std::max(kTurnOff, by_chance) + apparent_rate_;
-}
-
-/// Did one come in not long ago?
-bool HealthMonitor::images_come(TimeNs t_ns) const {
-  return cameras_ > 0 && last_frame_ns_ &&
-         seconds_between(last_arrival_ns_, t_ns) < std::max(kSilent, kMissedFrames * frame_interval_);
-}
-
 bool HealthMonitor::velocity_known() const {
   return last_.velocity_sigma < std::max(kWorstVelocity, kWorstDirection * last_.speed);
 }
 
-void HealthMonitor::decide(TimeNs t_ns) {
-  if (!started_ && last_.running && velocity_known()) {
-    started_ = true;
-    aided_ns_ = fitting_ns_ = t_ns;
-  }
+bool HealthMonitor::wheels_carry(const FrameStatistics& frame) const {
+  const bool sound = fault_of(Source::wheel_left).sound() || fault_of(Source::wheel_right).sound();
+  return wheels_ && frame.on_ground && sound && frame.wheel_rows_used > 0;
+}
+
+/// What carries the estimate, as far as the last frame is not too old.
+Aiding HealthMonitor::aiding_at(TimeNs t_ns) const {
   const FrameStatistics frame = seconds_between(last_.t_ns, t_ns) < kStale ? last_.statistics : FrameStatistics{};
-  const bool cameras = images_come(t_ns) && frame.tracks >= kFewTracks && (carrying_.sound() || late_);
-  const bool wheels = wheels_ && frame.on_ground && (sound(Source::wheel_left) || sound(Source::wheel_right)) &&
-                      frame.wheel_rows_used > 0;
-  health_.aiding = frame.standing      ? Aiding::standing
-                   : cameras && wheels ? Aiding::cameras_and_wheels
-                   : cameras           ? Aiding::cameras
-                   : wheels            ? Aiding::wheels
-                                       : Aiding::none;
-  if (health_.aiding != Aiding::none) aided_ns_ = t_ns;
-  const bool off = images_come(t_ns) && frame.tracks >= kFewTracks && last_.agreement.left > kMostOff;
-  if (!off || wheels) fitting_ns_ = t_ns;
-  contradicted_ = last_.running && seconds_between(fitting_ns_, t_ns) > kContradicted;
+  if (frame.standing) return Aiding::standing;
+  const bool cameras = images_.come(t_ns) && frame.tracks >= kFewTracks && images_.carry();
+  const bool wheels = wheels_carry(frame);
+  if (cameras) return wheels ? Aiding::cameras_and_wheels : Aiding::cameras;
+  return wheels ? Aiding::wheels : Aiding::none;
+}
+
+void HealthMonitor::decide(TimeNs t_ns) {
+  if (!life_.started && last_.running && velocity_known()) {
+    life_.started = true;
+    life_.aided_ns = life_.fitting_ns = t_ns;
+  }
+  health_.aiding = aiding_at(t_ns);
+  if (health_.aiding != Aiding::none) life_.aided_ns = t_ns;
+  const bool fresh = seconds_between(last_.t_ns, t_ns) < kStale;
+  const bool off =
+      fresh && images_.come(t_ns) && last_.statistics.tracks >= kFewTracks && last_.agreement.left > kMostOff;
+  if (!off || (fresh && wheels_carry(last_.statistics))) life_.fitting_ns = t_ns;
+  life_.contradicted = last_.running && seconds_between(life_.fitting_ns, t_ns) > kContradicted;
 
   health_.faulty.reset();
-  for (std::size_t source = 0; source < kSourceCount; ++source) {
-    if (faults_[source].sound()) continue;
-    health_.faulty.set(source);
-    health_.onset_ns[source] = faults_[source].onset_ns();
+  for (std::size_t i = 0; i < kSourceCount; ++i) {
+    const FaultState& fault = fault_of(static_cast<Source>(i));
+    if (fault.sound()) continue;
+    health_.faulty.set(i);
+    health_.onset_ns[i] = fault.onset_ns();
   }
-  const bool usable = last_.running && last_.possible && seconds_between(aided_ns_, t_ns) < kUnaided &&
-                      velocity_known() && !contradicted_;
-  const HealthStatus status = !started_              ? HealthStatus::initialising
+  const bool usable = last_.running && last_.possible && seconds_between(life_.aided_ns, t_ns) < kUnaided &&
+                      velocity_known() && !life_.contradicted;
+  const HealthStatus status = !life_.started         ? HealthStatus::initialising
                               : !usable              ? HealthStatus::lost
                               : health_.faulty.any() ? HealthStatus::degraded
                                                      : HealthStatus::tracking;
@@ -332,28 +210,27 @@ void HealthMonitor::decide(TimeNs t_ns) {
   if (status == HealthStatus::lost || status == HealthStatus::initialising) health_.quality = 0;
 }
 
-/// Two for each feature, 40 for wheels, all for a vehicle that stands; half at most where something is missing.
 int HealthMonitor::quality(const Frame& frame) const {
-  if (health_.status == HealthStatus::lost || health_.status == HealthStatus::initialising) return 0;
+  if (!usable()) return 0;
   int points = 0;
   switch (health_.aiding) {
     case Aiding::standing:
-      points = 100;
+      points = kFullQuality;
       break;
     case Aiding::cameras_and_wheels:
-      points = 40 + 2 * frame.statistics.tracks;
+      points = kWheelQuality + kTrackQuality * frame.statistics.tracks;
       break;
     case Aiding::cameras:
-      points = 2 * frame.statistics.tracks;
+      points = kTrackQuality * frame.statistics.tracks;
       break;
     case Aiding::wheels:
-      points = 40;
+      points = kWheelQuality;
       break;
     case Aiding::none:
-      points = 10;
+      points = kInertialQuality;
       break;
   }
-  return std::clamp(points, 1, health_.status == HealthStatus::degraded ? 60 : 100);
+  return std::clamp(points, 1, health_.status == HealthStatus::degraded ? kDegradedQuality : kFullQuality);
 }
 
 }  // namespace ear

@@ -27,7 +27,7 @@ double ExcessWatch::add(const Eigen::Vector3d& value, double dt) {
   const double distance = deviation.norm();
   const double ordinary = std::max(least_, kSpread * std::sqrt(variance_));
   const bool limit_known = range_ > 0.0 || clip_level_ > 0.0;
-  const bool cut_off = clipped(value);
+  const bool cut_off = clips_ = clipped(value);
   last_ = value;
 
   const bool strikes = distance > ordinary;

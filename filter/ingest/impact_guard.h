@@ -23,6 +23,8 @@ class ExcessWatch {
 
   /// Standard deviation of what may be wrong with the value beyond the sensor's noise; 0 for an ordinary value.
   double add(const Eigen::Vector3d& value, double dt);
+  /// Was the last value clipped?
+  [[nodiscard]] bool clips() const { return clips_; }
   /// How many values before the last one turn out, by it, to have been clipped as well.
   [[nodiscard]] int clipped_before() const { return clipped_before_; }
 
@@ -38,6 +40,7 @@ class ExcessWatch {
   int lasts_ = 0;          ///< samples in a row out of the ordinary
   double lasting_ = 0.0;   ///< from the first of them to now [s]
   int clipped_before_ = 0;
+  bool clips_ = false;
 };
 
 class ImpactGuard {
@@ -47,6 +50,8 @@ class ImpactGuard {
   /// Samples in time order, finite, as the sensor gives them. Whoever integrates over the piece between two samples
   /// takes the larger factor.
   ImuNoiseFactors add(const ImuSample& sample);
+  [[nodiscard]] bool gyro_clips() const { return gyro_.clips(); }  ///< the last sample
+  [[nodiscard]] bool accel_clips() const { return accel_.clips(); }
   /// So many samples before the last one have its factors as well: that there is a limit was not known yet.
   [[nodiscard]] int clipped_before() const { return std::max(gyro_.clipped_before(), accel_.clipped_before()); }
 

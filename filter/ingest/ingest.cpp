@@ -48,7 +48,7 @@ ImuVerdict Ingest::judge(const ImuSample& sample) {
   return verdict;
 }
 
-ImuSpike Ingest::store(const ImuSample& sample) {
+ImuFault Ingest::store(const ImuSample& sample) {
   ImuSpike spike;
   if (imu_.size() >= 2) {
     const ImuSample& before = imu_[imu_.size() - 2];
@@ -62,7 +62,7 @@ ImuSpike Ingest::store(const ImuSample& sample) {
   const ImuNoiseFactors noise = impact_guard_.add(sample);
   imu_.raise_newest_noise(static_cast<std::size_t>(impact_guard_.clipped_before()), noise);
   imu_.push(sample, noise);
-  return spike;
+  return {spike.gyro || impact_guard_.gyro_clips(), spike.accel || impact_guard_.accel_clips()};
 }
 
 Ingest::Encoders Ingest::take(const EncoderSample& given, std::optional<TimeNs> state_ns) {

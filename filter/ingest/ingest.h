@@ -28,6 +28,12 @@ struct Measurement {
   BeamRanges ranges;
 };
 
+/// Which of the inertial sensors is at fault?
+struct ImuFault {
+  bool gyro = false;
+  bool accel = false;
+};
+
 class Ingest {
  public:
   Ingest(const FilterConfig& config, const Calibration& calibration);
@@ -36,8 +42,8 @@ class Ingest {
   /// comes out goes to judge() and store().
   [[nodiscard]] ImuClock& imu_clock() { return imu_clock_; }
   [[nodiscard]] ImuVerdict judge(const ImuSample& sample);
-  /// Into the buffer, with what it shows about the sample before.
-  ImuSpike store(const ImuSample& sample);
+  /// Into the buffer. What only a fault of a sensor does: a spike (of the sample before), a clipped value.
+  ImuFault store(const ImuSample& sample);
 
   /// A reading, by the common clock and with the wheels' increment since the one before.
   struct Encoders {

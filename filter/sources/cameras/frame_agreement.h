@@ -10,10 +10,11 @@ struct FrameAgreement {
   double left = 0.0;           ///< share of them that are not where they were expected: left camera
   double right = 0.0;          ///< right camera
   double apparent_rate = 0.0;  ///< [rad/s] so fast the cameras' calibration may make it seem to turn
-  // What the image tells by itself, whatever came before.
-  double noise = 1.0;   ///< of the features, times the usual
-  double behind = 0.0;  ///< share of the stereo features that the geometry puts behind the cameras
-  bool frozen = false;  ///< the image is exactly the one before
+  // What the image shows by itself, whatever came before.
+  double noise = 1.0;          ///< of the features, times the usual
+  double behind = 0.0;         ///< share of the stereo features that the geometry puts behind the cameras
+  bool right_skipped = false;  ///< nobody looked at that of the second camera
+  bool frozen = false;         ///< the image is exactly the one before
   Eigen::Vector3d turn = Eigen::Vector3d::Zero();  ///< by which the vehicle turned more than predicted [rad], in B
   double turn_sigma = 0.0;                         ///< [rad] its standard deviation, the worst axis; 0: not known
 };

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <bitset>
 #include <cstdint>
 #include <limits>
 #include <optional>
@@ -40,8 +41,10 @@ class ContactDetector {
   [[nodiscard]] ContactMode mode() const { return mode_; }
   /// When the mode began; nothing while it is unknown.
   [[nodiscard]] std::optional<TimeNs> since_ns() const;
-  /// Does this beam give the same range again and again?
-  [[nodiscard]] bool stuck(std::size_t beam) const { return ground_ && ground_->stuck(beam); }
+  /// Beams that give the same range again and again.
+  [[nodiscard]] std::bitset<kMaxBeams> stuck_beams() const {
+    return ground_ ? ground_->stuck_beams() : std::bitset<kMaxBeams>{};
+  }
   /// Height of the wheels above the ground's plane [m], if the beams tell it to 5 cm.
   [[nodiscard]] std::optional<double> height() const;
   /// Unit normal of the ground in the body frame, if the beams tell it to 5 degrees.

@@ -2,6 +2,7 @@
 // Contact is decided in contact.h, the rows are in ground_rows.h. docs/filter.md, "Ground".
 #pragma once
 
+#include <bitset>
 #include <optional>
 
 #include "ear/calibration.h"
@@ -32,7 +33,8 @@ class Ground {
   /// Have the lasers seen the ground since it was last touched?
   [[nodiscard]] bool known() const { return running_.known; }
   [[nodiscard]] const std::optional<LaserCalibration>& lasers() const { return lasers_; }
-  [[nodiscard]] bool stuck(std::size_t beam) const { return contact_.stuck(beam); }
+  /// Beams that give the same range again and again.
+  [[nodiscard]] std::bitset<kMaxBeams> stuck_beams() const { return contact_.stuck_beams(); }
 
   /// One reading of the beams: a row each (2)-(4), and one for the axle, which lies along the ground.
   void update(const BeamRanges& reading, const ImuBuffer& imu, CameraUpdate calibration, Ekf& ekf, Records& records);

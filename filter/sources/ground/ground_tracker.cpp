@@ -107,6 +107,12 @@ bool GroundTracker::usable(Beam& beam, double range, TimeNs t_ns) const {
   return !beam.stuck && range >= lasers_.range_min && range <= lasers_.range_max;
 }
 
+std::bitset<kMaxBeams> GroundTracker::stuck_beams() const {
+  std::bitset<kMaxBeams> stuck;
+  for (std::size_t i = 0; i < beams_.size(); ++i) stuck[i] = beams_[i].stuck;
+  return stuck;
+}
+
 /// 0 = n_B . hit + r + h, linear in the state. False if the beam is not used.
 bool GroundTracker::update_with_hit(Beam& beam, const Eigen::Vector3d& d_B, const Eigen::Vector3d& hit_B, TimeNs t_ns) {
   Vector H = Vector::Unit(kHeight);

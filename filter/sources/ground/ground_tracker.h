@@ -7,11 +7,13 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <bitset>
 #include <optional>
 #include <vector>
 
 #include "ear/calibration.h"
 #include "ear/types.h"
+#include "filter/ingest/beam_ranges.h"
 
 namespace ear {
 
@@ -38,8 +40,8 @@ class GroundTracker {
   /// Readings in time order.
   Sighting update(const LaserSample& sample);
 
-  /// Has this beam given the same range again and again?
-  [[nodiscard]] bool stuck(std::size_t beam) const { return beam < beams_.size() && beams_[beam].stuck; }
+  /// Beams that give the same range again and again.
+  [[nodiscard]] std::bitset<kMaxBeams> stuck_beams() const;
   [[nodiscard]] int beams() const { return static_cast<int>(beams_.size()); }
   [[nodiscard]] double height() const { return x_(kHeight); }  ///< of the wheels above the plane [m]
   [[nodiscard]] double height_sigma() const;                   ///< [m]

@@ -1,0 +1,78 @@
+#include "filter/health/image_health.h"
+
+#include <algorithm>
+
+namespace ear {
+namespace {
+
+constexpr double kMajority = 0.5;       // of the stereo features behind the cameras: left and right exchanged
+constexpr double kSomeOff = 0.1;        // chosen: of the features off their place; a camera may be faulty
+constexpr double kNoisy = 1.5;          // chosen: times the usual noise of a feature: as little
+constexpr double kFewStereo = 0.25;     // chosen: of the features; less are seen by the right camera
+constexpr int kFewTracks = 10;          // chosen
+constexpr double kSparse = 0.4;         // chosen: of the usual number of features
+constexpr double kTracksMemory = 20.0;  // [s] chosen
+constexpr double kSilent = 0.12;        // [s] chosen: without a frame,
+constexpr double kMissedFrames = 2.5;   // chosen: and so many of its intervals
+constexpr double kSlowest = 0.5;        // [s] longer intervals are outages
+constexpr double kIntervalShare = 0.1;  // chosen: of each new interval in the usual one
+
+bool crossed(const FrameAgreement& seen) { return seen.behind > kMajority; }
+
+}  // namespace
+
+bool ImageHealth::check(const FrameAgreement& seen, TimeNs t_ns, TimeNs newest_imu_ns) {
+  stamps_unusual_ = stamps_.add(t_ns, newest_imu_ns);
+  const bool elsewhere = seen.matches > 0 && seen.left > kManyOff;
+  stamps_wrong_ = stamps_unusual_ && (stamps_wrong_ || elsewhere);
+  return !seen.frozen && !crossed(seen) && !stamps_wrong_;
+}
+
+void ImageHealth::add(const Image& image) {
+  if (arrival_ns_) {
+    const double interval = std::min(seconds_between(last_ns_, image.t_ns), kSlowest);
+    interval_ += (interval_ == 0.0 ? 1.0 : kIntervalShare) * (interval - interval_);
+  }
+  last_ns_ = image.t_ns;
+  arrival_ns_ = std::max(image.t_ns, image.newest_imu_ns);
+  if (cameras_ > 0) judge(image);
+  late_ = stamps_unusual_ && !stamps_wrong_ && image.seen.matches > 0 && image.seen.left < kManyOff;
+  if (stamps_unusual_) report(image.t_ns);
+}
+
+void ImageHealth::judge(const Image& image) {
+  const FrameAgreement& seen = image.seen;
+  const bool known = image.running && seen.matches > 0;
+  const int tracks = image.statistics.tracks;
+  const bool blind = tracks < kFewTracks;
+  const bool poor = blind || tracks < kSparse * usual_tracks_ || seen.noise > kNoisy;
+  const double share = std::max(interval_ / kTracksMemory, 1.0 / (1.0 + counted_));
+  usual_tracks_ += share * (tracks - usual_tracks_);
+  ++counted_;
+  carrying_.add(blind || (known && seen.left > kManyOff), image.t_ns);
+  left_.add(poor || (known && seen.left > kSomeOff), image.t_ns);
+  if (cameras_ == 2 && !seen.right_skipped) {
+    const bool one_eyed = image.statistics.stereo < kFewStereo * tracks;
+    right_.add(poor || one_eyed || (known && seen.right > kSomeOff), image.t_ns);
+  }
+  if (seen.frozen || crossed(seen)) report(image.t_ns);
+}
+
+void ImageHealth::add_silence(TimeNs t_ns) {
+  if (cameras_ > 0) left_.add(true, t_ns);
+  if (cameras_ > 1) right_.add(true, t_ns);
+  carrying_.add(true, t_ns);
+}
+
+void ImageHealth::report(TimeNs t_ns) {
+  if (cameras_ > 0) left_.report(t_ns);
+  if (cameras_ > 1) right_.report(t_ns);
+  carrying_.report(t_ns);
+}
+
+bool ImageHealth::come(TimeNs t_ns) const {
+  return cameras_ > 0 && arrival_ns_ &&
+         seconds_between(*arrival_ns_, t_ns) < std::max(kSilent, kMissedFrames * interval_);
+}
+
+}  // namespace ear

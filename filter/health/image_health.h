@@ -1,0 +1,66 @@
+// What the images show of the cameras: do they come, in time, with enough features where these should be?
+#pragma once
+
+#include <optional>
+
+#include "ear/estimate.h"
+#include "ear/types.h"
+#include "filter/health/fault_state.h"
+#include "filter/health/stamp_watch.h"
+#include "filter/sources/cameras/frame_agreement.h"
+
+namespace ear {
+
+class ImageHealth {
+ public:
+  static constexpr double kManyOff = 0.3;  // chosen: of the features off their place; images carry the estimate no more
+
+  /// `cameras`: 0 to 2.
+  explicit ImageHealth(std::size_t cameras) : cameras_(cameras) {}
+
+  /// Whether an image may be used, by how it agrees with what the state and the other sensors expect of it: not one
+  /// that repeats the last, not left and right exchanged, not one with a stamp that jumped; a late one is right.
+  [[nodiscard]] bool check(const FrameAgreement& seen, TimeNs t_ns, TimeNs newest_imu_ns);
+
+  /// An image at `t_ns`, after it was used or not. `running`: there is a state.
+  struct Image {
+    TimeNs t_ns = 0;
+    TimeNs newest_imu_ns = 0;
+    bool running = false;
+    FrameAgreement seen;
+    FrameStatistics statistics;
+  };
+  void add(const Image& image);
+  /// No image came for too long.
+  void add_silence(TimeNs t_ns);
+  /// Something that never happens to sound cameras.
+  void report(TimeNs t_ns);
+
+  /// Did one come not long ago?
+  [[nodiscard]] bool come(TimeNs t_ns) const;
+  [[nodiscard]] bool expected() const { return arrival_ns_.has_value(); }
+  [[nodiscard]] double interval() const { return interval_; }  ///< usual, of the images [s]
+  /// Do the images carry the estimate? They may where some of what they show is wrong, and where they come late but
+  /// fit.
+  [[nodiscard]] bool carry() const { return carrying_.sound() || late_; }
+  [[nodiscard]] const FaultState& left() const { return left_; }
+  [[nodiscard]] const FaultState& right() const { return right_; }
+
+ private:
+  void judge(const Image& image);
+
+  std::size_t cameras_;
+  FaultState left_, right_;
+  FaultState carrying_;  ///< less strict
+  StampWatch stamps_;
+  bool stamps_unusual_ = false;
+  bool stamps_wrong_ = false;
+  bool late_ = false;                 ///< the last image came late, and fits
+  TimeNs last_ns_ = 0;                ///< of the images
+  std::optional<TimeNs> arrival_ns_;  ///< the newest inertial stamp when the last one came
+  double interval_ = 0.0;             ///< [s] usual
+  double usual_tracks_ = 0.0;
+  int counted_ = 0;  ///< of those
+};
+
+}  // namespace ear
