@@ -52,23 +52,26 @@ Smoother::Smoother(const FilterConfig& config, const Calibration& calibration)
 }
 
 TimeNs Smoother::imu_time(TimeNs camera_time_ns) const {
-  return camera_time_ns + static_cast<TimeNs>(std::llround(1e9 * cameras().time_offset));
+  return camera_time_ns + static_cast<TimeNs>(std::llround(1e9 * calibration().camera.time_offset));
 }
 
 TimeNs Smoother::camera_time(TimeNs imu_time_ns) const {
-  return imu_time_ns - static_cast<TimeNs>(std::llround(1e9 * cameras().time_offset));
+  return imu_time_ns - static_cast<TimeNs>(std::llround(1e9 * calibration().camera.time_offset));
 }
 
-CameraState Smoother::cameras() const { return window_ ? window_->cameras() : starter_->cameras(); }
-
-OdometerState Smoother::odometer() const { return window_ ? window_->odometer() : starter_->odometer(); }
+CalibrationState Smoother::calibration() const {
+  return window_ ? CalibrationState{window_->cameras(), window_->odometer()} : starter_->calibration();
+}
 
 std::optional<TimeNs> Smoother::state_time() const {
   return window_ ? std::optional(window_->newest().t_ns) : std::nullopt;
 }
 
-bool Smoother::covers(TimeNs t_ns) const {
-  return is_time(t_ns) && !imu_.empty() && seconds_between(imu_.newest().t_ns, imu_time(t_ns)) < kHeldSample;
+FrameStamp Smoother::check_stamp(TimeNs t_ns) const {
+  if (any_frame_ && t_ns <= last_frame_ns_) return FrameStamp::not_later;
+  const bool covered =
+      is_time(t_ns) && !imu_.empty() && seconds_between(imu_.newest().t_ns, imu_time(t_ns)) < kHeldSample;
+  return covered ? FrameStamp::usable : FrameStamp::no_samples;
 }
 
 Status Smoother::status() const {
@@ -87,7 +90,7 @@ void Smoother::add_imu(const ImuSample& sample) {
     imu_.clear();
   }
   const ImuNoiseFactors noise = impact_guard_.add(sample);
-  imu_.doubt_newest(static_cast<std::size_t>(impact_guard_.clipped_before()), noise);
+  imu_.raise_newest_noise(static_cast<std::size_t>(impact_guard_.clipped_before()), noise);
   imu_.push(sample, noise);
   if (encoder_) note_contact(contact_.add_imu(sample));
 }
@@ -124,10 +127,10 @@ bool Smoother::rolls_at(TimeNs t_ns) const {
 }
 
 std::optional<Estimate> Smoother::process(const FeatureFrame& given) {
-  if (!is_next(given.t_ns) || !covers(given.t_ns)) return std::nullopt;
+  if (check_stamp(given.t_ns) != FrameStamp::usable) return std::nullopt;
   any_frame_ = true;
   last_frame_ns_ = given.t_ns;
-  const FeatureFrame& frame = guard_.sound(given);
+  const FeatureFrame& frame = guard_.plausible(given);
   std::optional<Estimate> estimate = window_ ? step(frame) : start(frame);
   if (estimate && window_) {
     last_image_ns_ = frame.t_ns;
@@ -138,7 +141,7 @@ std::optional<Estimate> Smoother::process(const FeatureFrame& given) {
 }
 
 std::optional<Estimate> Smoother::process_without_image(TimeNs t_ns) {
-  if (!covers(t_ns) || !is_next(t_ns) || (window_ && !on_ground())) return std::nullopt;
+  if (check_stamp(t_ns) != FrameStamp::usable || (window_ && !on_ground())) return std::nullopt;
   any_frame_ = true;
   last_frame_ns_ = t_ns;
   if (window_) return step(FeatureFrame{t_ns, {}});
@@ -150,8 +153,8 @@ std::optional<Estimate> Smoother::process_without_image(TimeNs t_ns) {
 std::optional<Estimate> Smoother::start(const FeatureFrame& frame) {
   std::optional<Estimate> started = starter_->process(frame);
   if (!started) return std::nullopt;
-  const State& x = starter_->state();
-  const auto P = starter_->covariance().matrix();
+  const State& x = starter_->ekf().state();
+  const auto P = starter_->ekf().covariance().matrix();
   window_.emplace(config_, focal_px_, x, P.topLeftCorner<err::clones, err::clones>());
   covariance_ = NewestCovariance{started->covariance, P.block<6, 6>(err::wheel_radius, err::wheel_radius)};
   b_g_ = x.imu.b_g;

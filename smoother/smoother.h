@@ -55,11 +55,9 @@ class Smoother final : public Estimator {
   /// It takes the time it takes.
   void set_window(int /*clones*/) override {}
   [[nodiscard]] InputCounts input_counts() const override { return guard_.counts(); }
-  [[nodiscard]] bool covers(TimeNs t_ns) const override;
-  [[nodiscard]] bool is_next(TimeNs t_ns) const override { return !any_frame_ || t_ns > last_frame_ns_; }
+  [[nodiscard]] FrameStamp check_stamp(TimeNs t_ns) const override;
   [[nodiscard]] TimeNs camera_time(TimeNs imu_time_ns) const override;
-  [[nodiscard]] CameraState cameras() const override;
-  [[nodiscard]] OdometerState odometer() const override;
+  [[nodiscard]] CalibrationState calibration() const override;
 
  private:
   // smoother.cpp

@@ -3,7 +3,6 @@
 #include <cmath>
 
 #include "filter/ekf/propagation.h"
-#include "filter/sources/wheels/displacement_update.h"
 #include "filter/sources/wheels/wheel_agreement.h"
 #include "filter/sources/wheels/wheel_displacement.h"
 #include "smoother/smoother.h"
@@ -31,10 +30,11 @@ void Smoother::compare_sensors(const FeatureFrame& frame, const ImuState& x, Tim
   displacements_ = Displacements{};
   displacements_[index_of(MotionSensor::imu)] = imu_displacement(motion, P_);
   if (encoder_ && rolls_at(x.t_ns) && normal_.known()) {
-    const WheelSetting setting{wheel_model(state.odometer), wheel_noise(config_.odometer, calibration_),
+    const WheelSetting setting{wheel_model(state.odometer),
+                               wheel_noise(config_.odometer, *calibration_.encoder, calibration_.imu),
                                config_.odometer.speed_sigma, config_.odometer.side_slip_turn, true};
     displacements_[index_of(MotionSensor::odometer)] =
-        wheel_displacement(state, P_, TurnsBetween(passed_turn_, turns_), imu_, t_ns, setting);
+        wheel_displacement(state, P_, WheelIncrements(passed_turn_, turns_), imu_, t_ns, setting);
   }
   const double bias = motion.duration * motion.duration * P_.matrix().diagonal().segment<3>(err::b_g).maxCoeff();
   displacements_[index_of(MotionSensor::camera)] =
@@ -108,9 +108,10 @@ std::optional<WheelDisplacement> Smoother::roll(const ImuState& x, TimeNs t_ns) 
 std::optional<WheelDisplacement> Smoother::integrate_wheels(const ImuState& x, TimeNs t_ns) {
   take_ranges(x.t_ns);
   const OdometerState odometer = window_->odometer();
-  WheelPreintegration wheels(wheel_model(odometer), wheel_noise(config_.odometer, calibration_));
+  WheelPreintegration wheels(wheel_model(odometer),
+                             wheel_noise(config_.odometer, *calibration_.encoder, calibration_.imu));
   bool started = false;
-  const TurnsBetween turns(passed_turn_, turns_);
+  const WheelIncrements turns(passed_turn_, turns_);
   TimeNs now_ns = x.t_ns;
   for (std::size_t i = 0; i < turns.size() && now_ns < t_ns; ++i) {
     const WheelIncrement& turn = turns[i];

@@ -1,6 +1,7 @@
 // The gate: does an innovation fit what is expected of it? Every source's measurements pass this one.
 #pragma once
 
+#include <utility>
 #include <vector>
 
 namespace ear {
@@ -9,6 +10,9 @@ class Gate {
  public:
   /// The quantiles of the chi-squared distribution at `probability`, in (0, 1), for 1 to max_dof degrees of freedom.
   Gate(double probability, int max_dof);
+
+  /// These thresholds, for 1, 2, ... degrees of freedom.
+  explicit Gate(std::vector<double> quantiles) : quantiles_(std::move(quantiles)) {}
 
   /// The quantile; the largest dof stands for all above.
   [[nodiscard]] double quantile(int dof) const;

@@ -53,16 +53,9 @@ enum class OdometerModel : std::uint8_t {
   terrain        ///< the paper's: pitch rate taken into account, direction along the ground that the lasers see
 };
 
-/// How the wheels enter the filter.
-enum class OdometerUpdate : std::uint8_t {
-  velocity,     ///< at every reading of the encoders
-  displacement  ///< once per frame, pre-integrated since the clone before
-};
-
 /// Wheels and lasers. What slips or bumps grows with the square root of the distance: [m] per sqrt(m).
 struct OdometerConfig {
   OdometerModel model = OdometerModel::terrain;
-  OdometerUpdate update = OdometerUpdate::velocity;  ///< displacement: with the terrain model only
   bool yaw_rate = false;    ///< the difference of the wheels with OdometerModel::terrain too; always without lasers
   double slip = 1e-3;       ///< along the track [m/sqrt(m)]
   double side_slip = 2e-3;  ///< across it [m/sqrt(m)]

@@ -30,11 +30,6 @@ const char* name_of(E choice) {
   throw std::logic_error("a choice without a name in config_fields.h");
 }
 
-constexpr auto names_of(OdometerUpdate) {
-  return std::array<std::pair<const char*, OdometerUpdate>, 2>{
-      {{"velocity", OdometerUpdate::velocity}, {"displacement", OdometerUpdate::displacement}}};
-}
-
 constexpr auto names_of(AnomalyScore) {
   return std::array<std::pair<const char*, AnomalyScore>, 2>{
       {{"distance", AnomalyScore::distance}, {"mahalanobis", AnomalyScore::mahalanobis}}};
@@ -104,7 +99,6 @@ EnableFor<C, OnlineCalibrationConfig> visit(C& c, F&& f) {
 template <typename C, typename F>
 EnableFor<C, OdometerConfig> visit(C& c, F&& f) {
   f("model", c.model);
-  f("update", c.update);
   f("yaw_rate", c.yaw_rate);
   f("slip", c.slip);
   f("side_slip", c.side_slip);

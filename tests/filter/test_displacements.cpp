@@ -6,8 +6,8 @@
 #include <cmath>
 #include <random>
 
+#include "filter/ekf/imu_displacement.h"
 #include "filter/ekf/propagation.h"
-#include "filter/sources/wheels/displacement_update.h"
 #include "tests/support/check_jacobian.h"
 #include "tests/support/random_state.h"
 
@@ -167,7 +167,7 @@ TEST_CASE("displacements: the covariance of the wheels' follows from the state's
     const auto displacement = [&](const State& state) {
       WheelSetting setting = setting_of(state);
       setting.on_plane = on_plane;
-      return wheel_displacement(state, P, TurnsBetween({}, turns), samples, kEnd, setting);
+      return wheel_displacement(state, P, WheelIncrements({}, turns), samples, kEnd, setting);
     };
     REQUIRE(displacement(x).available);
     CHECK(mean_chi_squared(rng, x, sigma, displacement(x), displacement) == doctest::Approx(3.0).epsilon(0.1));
@@ -193,7 +193,7 @@ TEST_CASE("displacements: the wheels' is that of the body, and needs readings al
   }
   const std::optional<WheelIncrement> passed = WheelIncrement{kStart - 4'000'000, kStart + 6'000'000, {-0.02, 0.02}};
   const auto displacement = [&](TimeNs until_ns) {
-    return wheel_displacement(x, P, TurnsBetween(passed, turns), samples, until_ns, setting_of(x));
+    return wheel_displacement(x, P, WheelIncrements(passed, turns), samples, until_ns, setting_of(x));
   };
   const Eigen::Vector3d p_BO = x.odometer.T_BO.p;
   const Displacement turned = displacement(kEnd);

@@ -3,13 +3,21 @@
 
 #include <limits>
 
-#include "filter/ekf/source_log.h"
+#include "filter/ekf/records.h"
 
 using namespace ear;
 
-TEST_CASE("source log: a measurement is compared with its gate") {
-  SourceLog log;
-  log.add(Source::wheel_left, 0.2, 0.01, 9.0, 100);
+namespace {
+
+constexpr double kGate = 9.0;
+
+Innovation innovation(double value) { return {value, 0.01, kGate, value * value <= kGate * 0.01}; }
+
+}  // namespace
+
+TEST_CASE("records: a measurement is compared with its gate") {
+  InnovationLog log;
+  log.add(Source::wheel_left, innovation(0.2), 100);
   const SourceRecord& wheel = log.records()[index_of(Source::wheel_left)];
   CHECK(wheel.innovation == 0.2);
   CHECK(wheel.variance == 0.01);
@@ -17,24 +25,24 @@ TEST_CASE("source log: a measurement is compared with its gate") {
   CHECK(wheel.used == 1);
   CHECK(wheel.rejected == 0);
   CHECK(wheel.last_used_ns == 100);
-  log.add(Source::wheel_left, -0.4, 0.01, 9.0, 200);
+  log.add(Source::wheel_left, innovation(-0.4), 200);
   CHECK(wheel.gate_ratio > 1.0);
   CHECK(wheel.rejected == 1);
   CHECK(wheel.last_used_ns == 100);
   CHECK(log.records()[index_of(Source::wheel_right)].used == 0);
 }
 
-TEST_CASE("source log: what is no number does not fit") {
-  SourceLog log;
-  log.add(Source::beam_0, std::numeric_limits<double>::quiet_NaN(), 0.01, 9.0, 100);
+TEST_CASE("records: what is no number does not fit") {
+  InnovationLog log;
+  log.add(Source::beam_0, innovation(std::numeric_limits<double>::quiet_NaN()), 100);
   CHECK(log.records()[index_of(Source::beam_0)].rejected == 1);
   CHECK(log.records()[index_of(Source::beam_0)].used == 0);
 }
 
-TEST_CASE("source log: a new frame counts from zero, and remembers what was measured last") {
-  SourceLog log;
-  log.add(Source::beam_2, 0.01, 1e-4, 9.0, 100);
-  log.add(Source::camera_left, {30, 2, 0.5, 0.36}, 9.0, 110);
+TEST_CASE("records: a new frame counts from zero, and remembers what was measured last") {
+  InnovationLog log;
+  log.add(Source::beam_2, innovation(0.01), 100);
+  log.add(Source::camera_left, InnovationLog::Features{30, 2, 0.5, 0.36, kGate}, 110);
   log.start_frame();
   const SourceRecord& beam = log.records()[index_of(Source::beam_2)];
   CHECK(beam.used == 0);

@@ -12,7 +12,7 @@ using namespace ear;
 namespace {
 
 constexpr double kSigma = 0.5 / 385.0;
-constexpr double kGate = 11.6;  // chi-square, 2 degrees of freedom, 0.997
+const Gate kGate(0.997, 2);
 
 CameraState cameras() {
   CameraState c;

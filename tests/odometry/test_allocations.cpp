@@ -94,7 +94,6 @@ TEST_CASE("allocations: none with every model of the odometer and every update")
     check(run(planar ? level : slope, config));  // on a slope the planar ones lose the estimate, and begin anew
   }
   FilterConfig config;
-  config.odometer.update = OdometerUpdate::displacement;
   config.anomaly.enabled = true;
   config.online_calibration.beam_tilt = true;
   check(run(slope, config));

@@ -115,8 +115,8 @@ struct Judgement {
 
 /// The band: where 95 % of the means over the runs of chi-squared numbers of 3 dof lie.
 Judgement judge(const std::vector<Nees>& runs, const std::vector<double> Nees::*which, const std::string& name) {
-  const double low = Gate(0.025, 3 * kRuns)(3 * kRuns) / kRuns;
-  const double high = Gate(0.975, 3 * kRuns)(3 * kRuns) / kRuns;
+  const double low = Gate(0.025, 3 * kRuns).quantile(3 * kRuns) / kRuns;
+  const double high = Gate(0.975, 3 * kRuns).quantile(3 * kRuns) / kRuns;
   std::size_t frames = (runs.front().*which).size();
   for (const Nees& nees : runs) frames = std::min(frames, (nees.*which).size());
   REQUIRE(frames > 1000);

@@ -142,9 +142,11 @@ TEST_CASE("restart: rolling, after all clocks were set back") {
 TEST_CASE("restart: after the state or its covariance turned into no numbers, standing, rolling and flying") {
   using Spoil = std::function<void(Filter&)>;
   const std::vector<Spoil> spoils{
-      [](Filter& f) { const_cast<State&>(f.state()).imu.v_W.y() = kNaN; },
-      [](Filter& f) { const_cast<State&>(f.state()).odometer.track_width = kNaN; },
-      [](Filter& f) { const_cast<Covariance&>(f.covariance()).widen(err::b_a, Eigen::Matrix3d::Constant(kNaN)); }};
+      [](Filter& f) { const_cast<State&>(f.ekf().state()).imu.v_W.y() = kNaN; },
+      [](Filter& f) { const_cast<State&>(f.ekf().state()).odometer.track_width = kNaN; },
+      [](Filter& f) {
+        const_cast<Covariance&>(f.ekf().covariance()).inflate(err::b_a, Eigen::Matrix3d::Constant(kNaN));
+      }};
   for (const char* sequence : {"static", "flat1", "fly1"}) {
     CAPTURE(sequence);
     const simulator::Simulation simulation = simulate(sequence);

@@ -34,10 +34,9 @@ struct Errors {
 };
 
 Errors run(const simulator::Simulation& simulation, OdometerModel model,
-           const std::function<void(FeatureFrame&)>& change = {}, OdometerUpdate update = OdometerUpdate::velocity) {
+           const std::function<void(FeatureFrame&)>& change = {}) {
   FilterConfig config;
   config.odometer.model = model;
-  config.odometer.update = update;
   Filter filter(config, simulation.calibration());
   Errors errors;
   double slopes = 0.0;
@@ -137,16 +136,6 @@ TEST_CASE("wheels and lasers: at five frames a second they lose nothing") {
   const double slow = run(simulator::Simulation(options), OdometerModel::terrain).position;
   CHECK(slow < 0.04);
   CHECK(slow < 2.0 * fast);
-}
-
-TEST_CASE("wheels and lasers: pre-integrated displacements do in place of velocities, in the dark too") {
-  const simulator::Simulation simulation = simulate("flat1", 813, 40.0);
-  CHECK(run(simulation, OdometerModel::terrain, {}, OdometerUpdate::displacement).position < 0.06);
-  const TimeNs covered_ns = simulation.frame_times().front() + 4'000'000'000;
-  const auto cover = [&](FeatureFrame& frame) {
-    if (frame.t_ns > covered_ns) frame.features.clear();
-  };
-  CHECK(run(simulation, OdometerModel::terrain, cover, OdometerUpdate::displacement).position < 0.3);
 }
 
 TEST_CASE("wheels and lasers: a body that swings on standing wheels does not move them") {

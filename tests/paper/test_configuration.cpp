@@ -20,7 +20,7 @@ TEST_CASE("configurations: what changes the estimate changes the text, and a nam
   const Configuration& all = find_configuration("default");
   CHECK(settings_text(all) == settings_text(find_configuration("terrain")));
   std::set<std::string> texts;
-  for (const std::string name : {"default", "none", "differential", "gyro", "displacement", "no-lasers", "smoother"}) {
+  for (const std::string name : {"default", "none", "differential", "gyro", "no-lasers", "smoother"}) {
     CAPTURE(name);
     CHECK(texts.insert(settings_text(find_configuration(name))).second);
   }

@@ -44,8 +44,6 @@ std::vector<Configuration> left_out() {
   constexpr double kNothing = 1e3;  // [m/sqrt(m)] a noise that makes a row say nothing
   std::vector<Configuration> list{
       with("no-side-slip", "no side-slip row", [](Config& c) { c.filter.odometer.side_slip = kNothing; }),
-      with("displacement", "displacement update",
-           [](Config& c) { c.filter.odometer.update = OdometerUpdate::displacement; }),
       with("oldest-clone", "oldest clone makes room", [](Config& c) { c.filter.keyframe_parallax_px = 0.0; }),
   };
   Configuration no_pitch_rate = with("no-pitch-rate", "no pitch-rate correction", [](Config&) {});
@@ -113,7 +111,7 @@ const std::vector<std::string>& ablation() {
   static const std::vector<std::string> names{
       "default",          "none",         "no-pitch-rate", "no-lasers",
       "beams-together",   "no-side-slip", "weights-off",   "weights-mahalanobis",
-      "weights-distance", "displacement", "oldest-clone",  "no-prediction"};
+      "weights-distance", "oldest-clone", "no-prediction"};
   return names;
 }
 
