@@ -1,0 +1,201 @@
+// The small filter: what it does to state and covariance, and the gate.
+#include "filter/ekf/ekf.h"
+
+#include <doctest/doctest.h>
+
+#include <cmath>
+
+#include "filter/ekf/propagation.h"
+
+using namespace ear;
+
+namespace {
+
+constexpr TimeNs kStart = 1'000'000'000;
+constexpr TimeNs kPeriod = 5'000'000;
+
+Calibration vehicle() {
+  Calibration calibration;
+  calibration.cameras.resize(2);
+  calibration.encoder.emplace();
+  return calibration;
+}
+
+/// At 1 m/s, standard deviations of 0.1 of everything.
+Ekf started() {
+  Ekf ekf(FilterConfig{}, vehicle());
+  ImuState x;
+  x.t_ns = kStart;
+  x.v_W = {1.0, 0.0, 0.0};
+  x.p_WB = {3.0, 2.0, 1.0};
+  ekf.start(x, Eigen::VectorXd::Constant(err::clones, 0.1));
+  return ekf;
+}
+
+/// A second of samples at rest against gravity, turning left at 0.5 rad/s.
+ImuBuffer samples() {
+  ImuBuffer imu(512);
+  for (TimeNs t_ns = kStart; t_ns <= kStart + 1'000'000'000; t_ns += kPeriod) {
+    imu.push({t_ns, {0.0, 0.0, 0.5}, {0.0, 0.0, 9.81}});
+  }
+  return imu;
+}
+
+/// A row that measures the velocity along x.
+GroundRows<2> velocity_row(double residual, double sigma) {
+  GroundRows<2> z;
+  z.H(0, ground_column(err::nu)) = 1.0;
+  z.residual(0) = residual;
+  z.sigma(0) = sigma;
+  z.count = 1;
+  return z;
+}
+
+const auto kIfItFits = [](int, const Innovation& innovation) { return innovation.fits; };
+
+}  // namespace
+
+TEST_CASE("ekf: a fresh one has no state, and reset() is back there") {
+  Ekf ekf(FilterConfig{}, vehicle());
+  CHECK_FALSE(ekf.running());
+  CHECK_FALSE(ekf.time());
+  ekf = started();
+  ekf.clone(1.0);
+  CHECK(ekf.time() == kStart);
+  ekf.reset();
+  CHECK_FALSE(ekf.running());
+  CHECK(ekf.state().clones.empty());
+  CHECK(ekf.state().imu.v_W.isZero());
+}
+
+TEST_CASE("ekf: propagation goes to the time asked for, and not back") {
+  Ekf ekf = started();
+  const ImuBuffer imu = samples();
+  CHECK_FALSE(ekf.propagate(imu, kStart + 400'000'000, {}));
+  CHECK(ekf.state().imu.t_ns == kStart + 400'000'000);
+  CHECK((ekf.state().imu.p_WB - Eigen::Vector3d(3.4, 2.0, 1.0)).norm() < 1e-9);
+  CHECK((ekf.rate_B() - Eigen::Vector3d(0.0, 0.0, 0.5)).norm() < 1e-12);
+  const State before = ekf.state();
+  CHECK_FALSE(ekf.propagate(imu, kStart, {}));
+  CHECK(ekf.state().imu.t_ns == before.imu.t_ns);
+}
+
+TEST_CASE("ekf: a weight of a half makes the accelerometer's noise twice as large") {
+  const auto grown = [](double weight) {
+    Ekf ekf = started();
+    Ekf::Propagation how;
+    how.weight = weight;
+    ekf.propagate(samples(), kStart + 1'000'000'000, how);
+    return ekf.covariance().matrix()(err::nu, err::nu);
+  };
+  const double noise = Calibration{}.imu.accel_noise;
+  CHECK(grown(0.5) - grown(1.0) == doctest::Approx(3.0 * noise * noise).epsilon(0.01));  // 4 - 1, over one second
+}
+
+TEST_CASE("ekf: a clipped sample is reported with the time from which on the state is uncertain") {
+  ImuBuffer imu(64);
+  for (TimeNs t_ns = kStart; t_ns <= kStart + 100'000'000; t_ns += kPeriod) {
+    const bool clipped = t_ns == kStart + 50'000'000;
+    imu.push({t_ns, {0.0, 0.0, 8.7}, {0.0, 0.0, 9.81}}, {clipped ? 1e4 : 1.0, 1.0});
+  }
+  Ekf ekf = started();
+  const std::optional<TimeNs> uncertain_ns = ekf.propagate(imu, kStart + 100'000'000, {});
+  REQUIRE(uncertain_ns);
+  CHECK(*uncertain_ns == kStart + 45'000'000);  // the piece that ends with it
+}
+
+TEST_CASE("ekf: the gate takes what the state and the noise allow, and nothing else changes the state") {
+  const double sigma = 0.05;
+  const double expected = std::sqrt(0.1 * 0.1 + sigma * sigma);
+  const double limit = std::sqrt(Gate(FilterConfig{}.gate_probability, 1).quantile(1)) * expected;
+  for (const double share : {-0.99, 0.99, 1.01, -1.01}) {
+    CAPTURE(share);
+    Ekf ekf = started();
+    GroundRows<2> z = velocity_row(share * limit, sigma);
+    const bool used = ekf.apply(z, 1.0, CameraUpdate::learned, kIfItFits);
+    CHECK(used == (std::abs(share) < 1.0));
+    CHECK((ekf.state().imu.v_W.x() != 1.0) == used);
+    CHECK((ekf.covariance().matrix()(err::nu, err::nu) < 0.009) == used);
+  }
+}
+
+TEST_CASE("ekf: what is no number never passes") {
+  Ekf ekf = started();
+  GroundRows<2> z = velocity_row(std::nan(""), 0.05);
+  CHECK_FALSE(ekf.apply(z, 1.0, CameraUpdate::learned, kIfItFits));
+  CHECK(ekf.possible());
+}
+
+TEST_CASE("ekf: a weight divides the noise of a row: R / w^2") {
+  Ekf weighted = started(), noisy = started();
+  GroundRows<2> z = velocity_row(0.1, 0.05);
+  weighted.apply(z, 0.5, CameraUpdate::learned, kIfItFits);
+  z = velocity_row(0.1, 0.1);
+  noisy.apply(z, 1.0, CameraUpdate::learned, kIfItFits);
+  CHECK(weighted.state().imu.v_W.isApprox(noisy.state().imu.v_W, 1e-12));
+  CHECK(weighted.covariance().matrix().isApprox(noisy.covariance().matrix(), 1e-12));
+}
+
+TEST_CASE("ekf: the cameras' calibration is learned or considered") {
+  for (const CameraUpdate update : {CameraUpdate::learned, CameraUpdate::considered}) {
+    CAPTURE(static_cast<int>(update));
+    Ekf ekf = started();
+    const double before = ekf.covariance().matrix()(err::time_offset, err::time_offset);
+    Eigen::MatrixXd H = Eigen::MatrixXd::Zero(1, err::clones);
+    H(0, err::nu) = 10.0;
+    H(0, err::time_offset) = 10.0;
+    ekf.apply(H, 0, Eigen::VectorXd::Constant(1, 1.0), update);
+    const bool learned = update == CameraUpdate::learned;
+    CHECK((ekf.state().camera.time_offset != 0.0) == learned);
+    CHECK((ekf.covariance().matrix()(err::time_offset, err::time_offset) < before) == learned);
+    CHECK(ekf.state().imu.v_W.x() != 1.0);
+  }
+}
+
+TEST_CASE("ekf: a clone is the body's pose now, and can be marginalised") {
+  Ekf ekf = started();
+  ekf.clone(1.5);
+  ekf.propagate(samples(), kStart + 100'000'000, {});
+  ekf.clone(1.0);
+  REQUIRE(ekf.state().clones.size() == 2);
+  CHECK(ekf.covariance().size() == err::clone(2));
+  CHECK(ekf.state().clones[0].feature_noise == 1.5);
+  CHECK(ekf.state().clones[0].T_WB.p == Eigen::Vector3d(3.0, 2.0, 1.0));
+  CHECK(ekf.state().clones[0].frame != ekf.state().clones[1].frame);
+  const Eigen::Matrix<double, 6, 6> newest = ekf.covariance().matrix().bottomRightCorner<6, 6>();
+  ekf.marginalise(0);
+  REQUIRE(ekf.state().clones.size() == 1);
+  CHECK(ekf.covariance().matrix().bottomRightCorner<6, 6>() == newest);
+}
+
+TEST_CASE("ekf: inflated motion is about the body, inflated biases are each sensor's own") {
+  Ekf ekf = started();
+  const Eigen::MatrixXd before = ekf.covariance().matrix();
+  ekf.inflate_motion(0.2, 0.3, 0.4);
+  const ImuErrorMatrix ordinary = ekf.ordinary_covariance(0.0);
+  Ekf other = started();
+  const ImuErrorMatrix without = other.ordinary_covariance(0.0);
+  const auto grown = (ordinary - without).diagonal();
+  CHECK(grown.segment<3>(estimate_error::rotation).isApprox(Eigen::Vector3d::Constant(0.04), 1e-9));
+  CHECK(grown.segment<3>(estimate_error::velocity).isApprox(Eigen::Vector3d::Constant(0.09), 1e-9));
+  CHECK(grown.segment<3>(estimate_error::position).isApprox(Eigen::Vector3d::Constant(0.16), 1e-9));
+  ekf.inflate_biases(0.0, 0.5);
+  const Eigen::MatrixXd after = ekf.covariance().matrix();
+  CHECK(after(err::b_g, err::b_g) == before(err::b_g, err::b_g));
+  CHECK(after(err::b_a, err::b_a) == doctest::Approx(before(err::b_a, err::b_a) + 0.25));
+}
+
+TEST_CASE("ekf: what updates did to the biases is given once, and apart for images") {
+  Ekf ekf = started();
+  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(1, err::clones);
+  H(0, err::b_g + 1) = 10.0;
+  ekf.apply(H, 0, Eigen::VectorXd::Constant(1, 1.0), CameraUpdate::learned, true);
+  ekf.apply(H, 0, Eigen::VectorXd::Constant(1, 1.0), CameraUpdate::learned, false);
+  BiasChanges changes = ekf.take_bias_changes();
+  CHECK(changes.all.correction(1) == doctest::Approx(ekf.state().imu.b_g.y()));
+  CHECK(changes.by_images.correction(1) < changes.all.correction(1));
+  CHECK(changes.all.variance_lowered(1) == doctest::Approx(0.01 - ekf.covariance().matrix()(10, 10)));
+  CHECK(ekf.take_bias_changes().all.correction.isZero());
+  ekf.discard_bias_changes();
+  CHECK(ekf.take_bias_changes().restarted);
+}
