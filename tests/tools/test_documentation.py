@@ -56,6 +56,13 @@ class Documentation(unittest.TestCase):
             if page.name != "README.md":
                 self.assertIn(f"({page.relative_to(ROOT / 'docs')})", index)
 
+    def test_named_files_exist(self):
+        folders = "|".join(sorted(path.name for path in ROOT.iterdir() if path.is_dir() and path.name != "build"))
+        for page in PAGES:
+            for name in re.findall(rf"`((?:{folders})/[\w./-]*)`", page.read_text(encoding="utf-8")):
+                with self.subTest(page=page.name, name=name):
+                    self.assertTrue((ROOT / name).exists())
+
     def test_lines_fit(self):
         for page in PAGES:
             for number, line in enumerate(page.read_text(encoding="utf-8").splitlines(), start=1):
