@@ -1,7 +1,8 @@
 """What the documentation shows is what works. test_documentation.py ROOT EAR_PROGRAM [TEST...]
 
 - README.md: its console blocks run, in order, in an empty folder; its C++ example is the file that a test builds.
-- Every page: its links lead somewhere, and the options in its console blocks exist.
+- Every page: its links lead somewhere, to a heading where they name one, and the options in its console blocks exist.
+- The index names every page, and no line but a table's is too long to read beside the code.
 Commands that take long stand in blocks called sh.
 """
 
@@ -17,6 +18,7 @@ from pathlib import Path
 ROOT = Path(sys.argv.pop(1)).resolve()
 PROGRAM = Path(sys.argv.pop(1)).resolve()
 README = ROOT / "README.md"
+LONGEST_LINE = 160
 PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").rglob("*.md"))]
 
 
@@ -30,19 +32,43 @@ def commands(page):
     return [line[2:] for line in lines if line.startswith("$ ")]
 
 
+def anchors(page):
+    """What a link can name in a page: its headings as GitHub writes them."""
+    headings = re.findall(r"^#+ (.*)$", page.read_text(encoding="utf-8"), re.MULTILINE)
+    return [re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings]
+
+
 class Documentation(unittest.TestCase):
     def test_links(self):
         for page in PAGES:
-            for link in re.findall(r"\]\(([^)#\s]+)", page.read_text(encoding="utf-8")):
-                if "://" not in link:
-                    with self.subTest(page=page.name, link=link):
-                        self.assertTrue((page.parent / link).exists())
+            for link, anchor in re.findall(r"\]\(([^)#\s]*)(?:#([^)\s]+))?\)", page.read_text(encoding="utf-8")):
+                if "://" in link:
+                    continue
+                with self.subTest(page=page.name, link=link, anchor=anchor):
+                    target = page.parent / link if link else page
+                    self.assertTrue(target.exists())
+                    if anchor:
+                        self.assertIn(anchor, anchors(target))
 
     def test_index_names_every_page(self):
         index = (ROOT / "docs/README.md").read_text(encoding="utf-8")
-        for page in sorted((ROOT / "docs").glob("*.md")):
+        for page in sorted((ROOT / "docs").rglob("*.md")):
             if page.name != "README.md":
-                self.assertIn(f"({page.name})", index)
+                self.assertIn(f"({page.relative_to(ROOT / 'docs')})", index)
+
+    def test_named_files_exist(self):
+        folders = "|".join(sorted(path.name for path in ROOT.iterdir() if path.is_dir() and path.name != "build"))
+        for page in PAGES:
+            for name in re.findall(rf"`((?:{folders})/[\w./-]*)`", page.read_text(encoding="utf-8")):
+                with self.subTest(page=page.name, name=name):
+                    self.assertTrue((ROOT / name).exists())
+
+    def test_lines_fit(self):
+        for page in PAGES:
+            for number, line in enumerate(page.read_text(encoding="utf-8").splitlines(), start=1):
+                if not line.lstrip().startswith("|"):
+                    with self.subTest(page=page.name, line=number):
+                        self.assertLessEqual(len(line), LONGEST_LINE)
 
     def test_embedding_example(self):
         example = (ROOT / "tests/tools/consumer/embed_odometry.cpp").read_text(encoding="utf-8")
