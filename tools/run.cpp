@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "src/health_text.h"
+#include "src/recording/calibration_files.h"
 #include "src/recording/config_fields.h"
 #include "src/recording/config_file.h"
 #include "src/recording/input_error.h"
@@ -182,6 +183,9 @@ void run(const RunArguments& args) {
   options.mono = args.mono;
   const OpenedRecording opened(args.recording, args.config);
   Recording recording(opened.folder(), options);
+  if (const auto missing = check_sensors(recording.calibration())) {
+    throw InputError(located(args.recording, 0, missing->where, missing->message));
+  }
   Odometry odometry = OdometryFactory::make(config, recording.calibration(), estimator_named(args.estimator));
 
   std::filesystem::create_directories(args.out);

@@ -185,4 +185,10 @@ std::vector<Finding> check_calibration(const Calibration& calibration) {
   return findings.list;
 }
 
+std::optional<Finding> check_sensors(const Calibration& calibration) {
+  if (!calibration.cameras.empty() || calibration.encoder) return std::nullopt;
+  return Finding{Severity::error, "cam0, encoder0",
+                 "neither a camera nor wheels: inertial samples and lasers alone do not give an estimate"};
+}
+
 }  // namespace ear

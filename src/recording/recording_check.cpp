@@ -31,7 +31,9 @@ class Check {
       options.calibration_files = files;
       options.accept_bad_calibration = true;
       Recording recording(folder, options);
+      report_.calibration = recording.calibration();
       report_.findings = check_calibration(recording.calibration());
+      if (const auto missing = check_sensors(recording.calibration())) report_.findings.push_back(*missing);
       read(recording);
       describe_streams(recording.calibration());
       judge_imu(recording.calibration().imu);

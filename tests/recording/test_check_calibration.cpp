@@ -109,6 +109,18 @@ TEST_CASE("check_calibration: a camera") {
   check_one(c, Severity::error, "cam0: resolution", "not positive");
 }
 
+TEST_CASE("check_sensors: a camera or wheels are needed") {
+  Calibration c = good();
+  CHECK_FALSE(check_sensors(c));
+  c.cameras.clear();
+  CHECK_FALSE(check_sensors(c));
+  c.encoder.reset();
+  REQUIRE(check_sensors(c));  // lasers alone
+  CHECK((check_sensors(c)->severity == Severity::error));
+  c.cameras = good().cameras;
+  CHECK_FALSE(check_sensors(c));
+}
+
 TEST_CASE("check_calibration: noise, wheels, beams") {
   Calibration c = good();
   c.imu.accel_noise = 0.0;
