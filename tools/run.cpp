@@ -163,13 +163,7 @@ RunSummary summarize(const RunArguments& args, const Recording& recording, const
                            {"stereo", t.stereo},   {"reject", t.reject}, {"filter", t.filter}};
   summary.health = totals.health;
   summary.warnings = recording.warnings();
-  const Calibration learned = odometry.calibration();
-  if (!learned.cameras.empty()) summary.calibration.emplace_back("camera_time_offset", learned.camera_time_offset);
-  if (learned.encoder) {
-    summary.calibration.emplace_back("wheel_radius_left", learned.encoder->wheel_radius[0]);
-    summary.calibration.emplace_back("wheel_radius_right", learned.encoder->wheel_radius[1]);
-    summary.calibration.emplace_back("track_width", learned.encoder->track_width);
-  }
+  summary.calibration = odometry.calibration();
   return summary;
 }
 
