@@ -9,7 +9,7 @@ set(filter_include_dir ${CMAKE_INSTALL_INCLUDEDIR}/ear-filter)
 target_include_directories(ear_filter INTERFACE $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>
                                                 $<INSTALL_INTERFACE:${filter_include_dir}>)
 
-foreach(part IN ITEMS ear filter frontend)
+foreach(part IN ITEMS ear filter frontend log)
   set(target ear)
   if(NOT part STREQUAL ear)
     set(target ear_${part})

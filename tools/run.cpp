@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "src/health_text.h"
+#include "src/log/log.h"
 #include "src/recording/calibration_files.h"
 #include "src/recording/config_fields.h"
 #include "src/recording/config_file.h"
@@ -224,8 +225,7 @@ void run(const RunArguments& args) {
   }
   if (flight_controller) std::printf("%s\n", flight_controller->report().c_str());
   for (const Warning& warning : recording.warnings()) {
-    std::fprintf(stderr, "ear: warning: %s, %llu times, first at %s\n", warning.kind.c_str(),
-                 static_cast<unsigned long long>(warning.count), warning.first.c_str());
+    log_warning(warning.kind + ", " + std::to_string(warning.count) + " times, first at " + warning.first);
   }
   if (totals.estimates == 0) {
     throw InputError(args.recording.string() + ": no estimate: " + status_text(odometry.status()));
