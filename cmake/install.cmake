@@ -1,5 +1,6 @@
 # The installed package: find_package(ear) gives ear::ear (class Odometry), and ear::filter (the estimator alone, which
-# needs Eigen only and is included as "filter/...").
+# needs Eigen only and is included as "filter/..."). find_package(ear COMPONENTS filter) looks for Eigen only. With
+# EAR_FILTER_ONLY there is no other part.
 include(CMakePackageConfigHelpers)
 
 set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/ear)
@@ -9,7 +10,15 @@ set(filter_include_dir ${CMAKE_INSTALL_INCLUDEDIR}/ear-filter)
 target_include_directories(ear_filter INTERFACE $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>
                                                 $<INSTALL_INTERFACE:${filter_include_dir}>)
 
-foreach(part IN ITEMS ear filter frontend)
+# Headers of what is not built would only break at linking.
+set(not_installed "")
+if(EAR_FILTER_ONLY)
+  set(EAR_PACKAGE_PARTS filter)
+  set(not_installed PATTERN ear_c.h EXCLUDE PATTERN odometry.h EXCLUDE)
+else()
+  set(EAR_PACKAGE_PARTS ear filter frontend log)
+endif()
+foreach(part IN LISTS EAR_PACKAGE_PARTS)
   set(target ear)
   if(NOT part STREQUAL ear)
     set(target ear_${part})
@@ -19,11 +28,11 @@ foreach(part IN ITEMS ear filter frontend)
   install(TARGETS ${target} EXPORT ear ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}
                                        LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
 endforeach()
-if(EAR_BUILD_TOOLS)
+if(TARGET ear_program)
   install(TARGETS ear_program RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 endif()
 
-install(DIRECTORY ${PROJECT_SOURCE_DIR}/include/ear DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/include/ear DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} ${not_installed})
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/filter DESTINATION ${filter_include_dir} FILES_MATCHING PATTERN "*.h")
 install(EXPORT ear NAMESPACE ear:: FILE earTargets.cmake DESTINATION ${package_dir})
 

@@ -10,7 +10,7 @@ set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PACKAGE_MAINTAINER "EAR-MSCKF developers <ear-msckf@localhost>")
 set(CPACK_DEBIAN_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)  # what the program needs to run
-set(CPACK_DEBIAN_PACKAGE_RECOMMENDS "libeigen3-dev, libopencv-dev")  # what programs that embed the library need to build
+set(CPACK_DEBIAN_PACKAGE_RECOMMENDS "libeigen3-dev, libopencv-dev, libspdlog-dev")  # what programs that embed the library need to build
 set(CPACK_DEBIAN_PACKAGE_DESCRIPTION
     "Estimates where a vehicle is that drives and flies, from a stereo camera, an
 IMU, wheel encoders and lasers. Holds the program ear, and the library with its

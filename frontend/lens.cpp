@@ -16,13 +16,13 @@ struct Distorted {
   Eigen::Matrix2d J_value_point;
 };
 
-// Brown's model with two radial and two tangential coefficients, and its derivative.
-Distorted distort(const Eigen::Vector4d& k, const Eigen::Vector2d& p) {
+// Brown's model with three radial and two tangential coefficients (k1, k2, p1, p2, k3), and its derivative.
+Distorted distort(const LensCoefficients& k, const Eigen::Vector2d& p) {
   const double x = p.x();
   const double y = p.y();
   const double r2 = x * x + y * y;
-  const double radial = 1.0 + r2 * (k[0] + r2 * k[1]);
-  const double radial_slope = 2.0 * (k[0] + 2.0 * r2 * k[1]);  // d radial / d r2, times 2
+  const double radial = 1.0 + r2 * (k[0] + r2 * (k[1] + r2 * k[4]));
+  const double radial_slope = 2.0 * (k[0] + r2 * (2.0 * k[1] + 3.0 * r2 * k[4]));  // d radial / d r2, times 2
   Distorted d;
   d.value.x() = x * radial + 2.0 * k[2] * x * y + k[3] * (r2 + 2.0 * x * x);
   d.value.y() = y * radial + k[2] * (r2 + 2.0 * y * y) + 2.0 * k[3] * x * y;
@@ -38,21 +38,22 @@ struct DistortedAngle {
   double slope;
 };
 
-DistortedAngle distort_angle(const Eigen::Vector4d& k, double a) {
+DistortedAngle distort_angle(const LensCoefficients& k, double a) {
   const double a2 = a * a;
   return {a * (1.0 + a2 * (k[0] + a2 * (k[1] + a2 * (k[2] + a2 * k[3])))),
           1.0 + a2 * (3.0 * k[0] + a2 * (5.0 * k[1] + a2 * (7.0 * k[2] + a2 * 9.0 * k[3])))};
 }
 
 // Largest radius (or angle) up to which the radial part of the model grows.
-double find_max_radius(LensModel model, const Eigen::Vector4d& k) {
+double find_max_radius(LensModel model, const LensCoefficients& k) {
   constexpr double kStep = 0.01;
   const double limit = model == LensModel::equidistant ? std::atan(kMaxTangent) : kMaxTangent;
   double radius = kStep;
   for (; radius < limit; radius += kStep) {
     const double r2 = radius * radius;
-    const double slope =
-        model == LensModel::equidistant ? distort_angle(k, radius).slope : 1.0 + r2 * (3.0 * k[0] + r2 * 5.0 * k[1]);
+    const double slope = model == LensModel::equidistant
+                             ? distort_angle(k, radius).slope
+                             : 1.0 + r2 * (3.0 * k[0] + r2 * (5.0 * k[1] + r2 * 7.0 * k[4]));
     if (slope <= 0.0) break;
   }
   return radius - kStep;
@@ -61,15 +62,15 @@ double find_max_radius(LensModel model, const Eigen::Vector4d& k) {
 }  // namespace
 
 Lens::Lens(const CameraCalibration& camera)
-    : model_(camera.lens),
-      focal_(camera.fu, camera.fv),
-      centre_(camera.cu, camera.cv),
-      k_(camera.distortion[0], camera.distortion[1], camera.distortion[2], camera.distortion[3]) {
+    : model_(camera.lens), focal_(camera.fu, camera.fv), centre_(camera.cu, camera.cv), k_(camera.distortion.data()) {
   if (camera.width <= 0 || camera.height <= 0) throw std::invalid_argument("camera: resolution must be positive");
   if (!focal_.allFinite() || focal_.minCoeff() <= 0.0) {
     throw std::invalid_argument("camera: focal lengths must be positive");
   }
   if (!centre_.allFinite() || !k_.allFinite()) throw std::invalid_argument("camera: intrinsics must be finite");
+  if (model_ == LensModel::equidistant && k_[4] != 0.0) {
+    throw std::invalid_argument("camera: distortion: the equidistant model has four coefficients, the fifth is not 0");
+  }
   max_radius_ = find_max_radius(model_, k_);
 }
 

@@ -8,6 +8,8 @@
 
 namespace ear {
 
+using LensCoefficients = Eigen::Matrix<double, 5, 1>;  // in the order of CameraCalibration::distortion
+
 /// Maps between pixels and normalized image coordinates (x/z, y/z), which have no lens in them.
 class Lens {
  public:
@@ -31,7 +33,7 @@ class Lens {
   LensModel model_;
   Eigen::Vector2d focal_;
   Eigen::Vector2d centre_;
-  Eigen::Vector4d k_;
+  LensCoefficients k_;
   double max_radius_ =
       0.0;  // of a normalized point (radial-tangential) or angle [rad] (equidistant): the model folds beyond
 };

@@ -80,7 +80,7 @@ ear::CameraCalibration camera_of(const ear_camera& from) {
   camera.cu = from.cu;
   camera.cv = from.cv;
   camera.lens = choice<ear::LensModel>(from.lens, 2, "lens");
-  std::copy_n(from.distortion, 4, camera.distortion.begin());
+  std::copy_n(from.distortion, camera.distortion.size(), camera.distortion.begin());
   camera.rate_hz = from.rate_hz;
   return camera;
 }

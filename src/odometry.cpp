@@ -9,6 +9,7 @@
 #include "filter/filter.h"
 #include "filter/ingest/stamp_guard.h"
 #include "frontend/frontend.h"
+#include "src/event_log.h"
 #include "src/load_governor.h"
 #include "src/odometry_factory.h"
 
@@ -53,45 +54,15 @@ class Odometry::Impl {
   void add_laser(const LaserSample& sample) { estimator_->add_laser(sample); }
 
   std::optional<Estimate> add_stereo(const StereoFrame& given) {
-    stage_times_ = StageTimes{};
-    const std::optional<TimeNs> stamp_ns = estimator_->common_stamp(given.t_ns);
-    if (!stamp_ns) {
-      ++camera_.far_ahead;
-      return std::nullopt;
-    }
-    StereoFrame frame = given;
-    frame.t_ns = *stamp_ns;
-    if (!accepts(frame.t_ns, camera_)) {
-      if (is_time(frame.t_ns) && estimator_->check_stamp(frame.t_ns) == FrameStamp::no_samples) {
-        estimator_->refuse_frame();
-      }
-      return std::nullopt;
-    }
-    if (!takes_turn()) {
-      note_frame(frame.t_ns);
-      return std::nullopt;
-    }
-    const double start = clock_();
-    const FeatureFrame* const features = track(frame);
-    if (features == nullptr) {
-      ++camera_.implausible;
-      return std::nullopt;
-    }
-    note_frame(frame.t_ns);
-    std::optional<Estimate> estimate = update(*features);
-    load_.add(clock_() - start);
+    std::optional<Estimate> estimate = process(given);
+    events_.note(given.t_ns, health(), input_counts());
     return estimate;
   }
 
   std::optional<Estimate> step(TimeNs t_ns) {
-    stage_times_ = StageTimes{};
-    FeatureFrame nothing;
-    if (!is_time(t_ns)) {
-      ++steps_.implausible;
-      return std::nullopt;
-    }
-    nothing.t_ns = estimator_->camera_time(t_ns);
-    return accepts(nothing.t_ns, steps_) ? update(nothing) : std::nullopt;
+    std::optional<Estimate> estimate = process_step(t_ns);
+    events_.note(t_ns, health(), input_counts());
+    return estimate;
   }
 
   [[nodiscard]] const Estimator& estimator() const { return *estimator_; }
@@ -136,6 +107,48 @@ class Odometry::Impl {
   }
 
  private:
+  std::optional<Estimate> process(const StereoFrame& given) {
+    stage_times_ = StageTimes{};
+    const std::optional<TimeNs> stamp_ns = estimator_->common_stamp(given.t_ns);
+    if (!stamp_ns) {
+      ++camera_.far_ahead;
+      return std::nullopt;
+    }
+    StereoFrame frame = given;
+    frame.t_ns = *stamp_ns;
+    if (!accepts(frame.t_ns, camera_)) {
+      if (is_time(frame.t_ns) && estimator_->check_stamp(frame.t_ns) == FrameStamp::no_samples) {
+        estimator_->refuse_frame();
+      }
+      return std::nullopt;
+    }
+    if (!takes_turn()) {
+      note_frame(frame.t_ns);
+      return std::nullopt;
+    }
+    const double start = clock_();
+    const FeatureFrame* const features = track(frame);
+    if (features == nullptr) {
+      ++camera_.implausible;
+      return std::nullopt;
+    }
+    note_frame(frame.t_ns);
+    std::optional<Estimate> estimate = update(*features);
+    load_.add(clock_() - start);
+    return estimate;
+  }
+
+  std::optional<Estimate> process_step(TimeNs t_ns) {
+    stage_times_ = StageTimes{};
+    FeatureFrame nothing;
+    if (!is_time(t_ns)) {
+      ++steps_.implausible;
+      return std::nullopt;
+    }
+    nothing.t_ns = estimator_->camera_time(t_ns);
+    return accepts(nothing.t_ns, steps_) ? update(nothing) : std::nullopt;
+  }
+
   /// Is a frame with this stamp later than the one before, and are its inertial samples there? Counts those that are
   /// not.
   bool accepts(TimeNs t_ns, StreamCounts& counts) const {
@@ -199,7 +212,8 @@ class Odometry::Impl {
       stage_times_.stereo = timing.stereo;
       stage_times_.reject = timing.reject;
       return &features;
-    } catch (const std::exception&) {  // one bad image must not take the vehicle its estimator; it is counted
+    } catch (const std::exception& error) {  // one bad image must not take the vehicle its estimator; it is counted
+      events_.note_unusable(frame.t_ns, error.what());
       return nullptr;
     }
   }
@@ -217,6 +231,7 @@ class Odometry::Impl {
   StreamCounts camera_;
   StreamCounts steps_;
   std::optional<TimeNs> last_frame_ns_;
+  EventLog events_;
 };
 
 Odometry::Odometry(const Config& config, const Calibration& calibration, Clock clock)

@@ -3,7 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <string>
 #include <utility>
+
+#include "src/log/log.h"
 
 namespace ear {
 namespace {
@@ -134,8 +137,23 @@ void QueuedOdometry::drop_old_frames() {
 
 void QueuedOdometry::tell_state() { live_.tell(odometry_.predict(newest_imu_ns_), newest_imu_ns_); }
 
+/// By the thread that estimates, since a sensor's must not wait for a file.
+void QueuedOdometry::log_overflows() {
+  const Overflows now = overflows();
+  const bool same = now.imu == logged_.imu && now.encoder == logged_.encoder && now.laser == logged_.laser &&
+                    now.frames == logged_.frames;
+  if (same) return;
+  logged_ = now;
+  if (const auto held_back = log_limit_.allows("overflow", newest_imu_ns_)) {
+    log_warning("the estimator is behind: refused so far: " + std::to_string(now.imu) + " imu, " +
+                std::to_string(now.encoder) + " encoder, " + std::to_string(now.laser) + " laser samples, " +
+                std::to_string(now.frames) + " frames" + held_back_text(*held_back));
+  }
+}
+
 Progress QueuedOdometry::process(std::optional<Estimate>& estimate) {
   if (drops_frames_) drop_old_frames();
+  log_overflows();
   const Frame* const frame = frames_.queue.front();
   if (frame == nullptr) {
     hand_over(std::numeric_limits<TimeNs>::max());

@@ -10,6 +10,7 @@
 
 #include "ear/odometry.h"
 #include "src/live_state.h"
+#include "src/log/repeat_limit.h"
 #include "src/sample_queue.h"
 
 namespace ear {
@@ -101,6 +102,7 @@ class QueuedOdometry {
   [[nodiscard]] StereoFrame view_of(const Frame& frame) const;
   void drop_old_frames();
   void hand_over(TimeNs until_ns);
+  void log_overflows();
   void tell_state();
 
   Odometry odometry_;
@@ -114,6 +116,8 @@ class QueuedOdometry {
   LaserSample laser_sample_;  ///< reused
   TimeNs newest_imu_ns_ = std::numeric_limits<TimeNs>::min();
   LiveState live_;
+  Overflows logged_;  ///< that the log knows of
+  RepeatLimit log_limit_{10.0};
 };
 
 }  // namespace ear

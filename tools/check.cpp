@@ -5,9 +5,12 @@
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "ear/odometry.h"
+#include "src/recording/config_file.h"
 #include "src/recording/recording_check.h"
 #include "tools/commands.h"
 #include "tools/opened_recording.h"
@@ -105,9 +108,21 @@ void print(const RecordingReport& report) {
   std::printf("\n%s\n", report.usable() ? "usable" : "not usable");
 }
 
+// What the estimator refuses makes a recording unusable, too.
+void try_estimator(const Config& config, RecordingReport& report) {
+  if (!report.calibration || !report.usable()) return;
+  try {
+    const Odometry odometry(config, *report.calibration);
+  } catch (const std::invalid_argument& error) {
+    report.findings.push_back({Severity::error, "estimator", error.what()});
+  }
+}
+
 void check(const CheckArguments& arguments) {
+  const Config config = arguments.config.empty() ? Config{} : load_config(arguments.config);
   const OpenedRecording opened(arguments.recording, arguments.config);
-  const RecordingReport report = check_recording(opened.folder(), arguments.calibration_files);
+  RecordingReport report = check_recording(opened.folder(), arguments.calibration_files);
+  try_estimator(config, report);
   if (arguments.json) {
     std::cout << to_json(report).dump(2) << '\n';
   } else {
@@ -125,7 +140,9 @@ void add_check_command(CLI::App& app) {
   command->add_option("recording", arguments->recording, "Folder of the recording, or a ROS 1 bag")->required();
   command->add_option("--calibration", arguments->calibration_files,
                       "Kalibr's camchain-imucam.yaml or imu.yaml, instead of the recording's own; may be given twice");
-  command->add_option("--config", arguments->config, "Settings, of which a bag's topics count (docs/bags.md)")
+  command
+      ->add_option("--config", arguments->config,
+                   "Settings of the estimator that is to use it, and a bag's topics (docs/bags.md)")
       ->check(CLI::ExistingFile);
   command->add_flag("--json", arguments->json, "Print JSON");
   command->footer("Exit code: 0 usable (perhaps with warnings), 2 unusable.");

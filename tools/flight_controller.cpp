@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "src/log/log.h"
 #include "src/recording/input_error.h"
 
 namespace ear::tools {
@@ -64,6 +65,12 @@ void FlightController::after_frame(const ReplayedFrame& frame, const Odometry& o
   const auto message = stream_.add_frame(frame.estimate, odometry.status());
   announce(stream_.health(), odometry.health().faulty);
   if (message) link_.send(*message);
+  const std::uint64_t dropped = link_.counts().dropped;
+  if (dropped == dropped_) return;
+  dropped_ = dropped;
+  if (const auto held_back = log_limit_.allows("dropped", frame.t_ns)) {
+    log_warning("mavlink: " + std::to_string(dropped) + " messages not taken so far" + held_back_text(*held_back));
+  }
 }
 
 std::string FlightController::report() const {
@@ -82,6 +89,7 @@ void FlightController::announce(mavlink::LinkHealth health, const SourceSet& fau
   const mavlink::StatusText text = mavlink::to_text(health, faulty);
   if (text.text == announced_) return;
   announced_ = text.text;
+  log_info("mavlink: says " + std::string(text.text));
   link_.set_state(mavlink::to_system_state(health));
   link_.send(text);
 }

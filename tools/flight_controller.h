@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "ear/odometry.h"
+#include "src/log/repeat_limit.h"
 #include "src/mavlink/link.h"
 #include "src/mavlink/odometry_stream.h"
 #include "src/recording/recording.h"
@@ -47,8 +48,10 @@ class FlightController {
   RealTimeClock clock_;
   mavlink::OdometryStream stream_;
   std::optional<TimeNs> last_imu_ns_;
-  std::string announced_;  ///< the last text
-  mavlink::Link link_;     ///< last: its thread reads the clock
+  std::string announced_;      ///< the last text
+  std::uint64_t dropped_ = 0;  ///< messages not taken that the log knows of
+  RepeatLimit log_limit_{10.0};
+  mavlink::Link link_;  ///< last: its thread reads the clock
 };
 
 }  // namespace ear::tools

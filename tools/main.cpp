@@ -1,12 +1,13 @@
 // ear: localisation of a vehicle that drives and flies, from recordings. `ear SUBCOMMAND --help` explains each.
 #include <cstdlib>
 #include <exception>
-#include <iostream>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "src/log/log.h"
 #include "tools/commands.h"
+#include "tools/log_options.h"
 
 namespace {
 
@@ -31,6 +32,7 @@ int run_subcommand(int argc, char** argv) {
   ear::tools::add_bench_command(app);
   ear::tools::add_export_command(app);
   ear::tools::add_experiments_command(app);
+  ear::tools::add_log_options(app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {  // also --help
@@ -46,7 +48,7 @@ int main(int argc, char** argv) {
   try {
     return run_subcommand(argc, argv);
   } catch (const std::exception& error) {
-    std::cerr << "ear: " << error.what() << '\n';
+    ear::log_error(error.what());
     return EXIT_FAILURE;
   }
 }

@@ -6,6 +6,7 @@
 #include <system_error>
 
 #include "src/bag/bag.h"
+#include "src/log/log.h"
 #include "src/recording/input_error.h"
 
 namespace ear::tools {
@@ -26,6 +27,7 @@ OpenedRecording::OpenedRecording(const fs::path& recording, const fs::path& conf
   const BagTopics topics = config.empty() ? BagTopics{} : load_topics(config);
   temporary_ = make_temporary_folder();
   try {
+    log_info(recording.string() + ": being unpacked to " + temporary_.string());
     unpack_bag(recording, topics, temporary_);
   } catch (...) {
     fs::remove_all(temporary_);

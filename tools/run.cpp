@@ -12,6 +12,8 @@
 #include <vector>
 
 #include "src/health_text.h"
+#include "src/log/log.h"
+#include "src/recording/calibration_files.h"
 #include "src/recording/config_fields.h"
 #include "src/recording/config_file.h"
 #include "src/recording/input_error.h"
@@ -162,13 +164,7 @@ RunSummary summarize(const RunArguments& args, const Recording& recording, const
                            {"stereo", t.stereo},   {"reject", t.reject}, {"filter", t.filter}};
   summary.health = totals.health;
   summary.warnings = recording.warnings();
-  const Calibration learned = odometry.calibration();
-  if (!learned.cameras.empty()) summary.calibration.emplace_back("camera_time_offset", learned.camera_time_offset);
-  if (learned.encoder) {
-    summary.calibration.emplace_back("wheel_radius_left", learned.encoder->wheel_radius[0]);
-    summary.calibration.emplace_back("wheel_radius_right", learned.encoder->wheel_radius[1]);
-    summary.calibration.emplace_back("track_width", learned.encoder->track_width);
-  }
+  summary.calibration = odometry.calibration();
   return summary;
 }
 
@@ -182,6 +178,9 @@ void run(const RunArguments& args) {
   options.mono = args.mono;
   const OpenedRecording opened(args.recording, args.config);
   Recording recording(opened.folder(), options);
+  if (const auto missing = check_sensors(recording.calibration())) {
+    throw InputError(located(args.recording, 0, missing->where, missing->message));
+  }
   Odometry odometry = OdometryFactory::make(config, recording.calibration(), estimator_named(args.estimator));
 
   std::filesystem::create_directories(args.out);
@@ -226,8 +225,7 @@ void run(const RunArguments& args) {
   }
   if (flight_controller) std::printf("%s\n", flight_controller->report().c_str());
   for (const Warning& warning : recording.warnings()) {
-    std::fprintf(stderr, "ear: warning: %s, %llu times, first at %s\n", warning.kind.c_str(),
-                 static_cast<unsigned long long>(warning.count), warning.first.c_str());
+    log_warning(warning.kind + ", " + std::to_string(warning.count) + " times, first at " + warning.first);
   }
   if (totals.estimates == 0) {
     throw InputError(args.recording.string() + ": no estimate: " + status_text(odometry.status()));

@@ -11,9 +11,9 @@
 
 namespace ear {
 
-/// How a lens bends rays; both models have four coefficients, in OpenCV's order.
+/// How a lens bends rays; the coefficients are in OpenCV's order.
 enum class LensModel {
-  radial_tangential,  ///< k1, k2, p1, p2
+  radial_tangential,  ///< k1, k2, p1, p2, k3 (Brown; ROS calls it plumb_bob)
   equidistant         ///< k1, k2, k3, k4 (Kannala-Brandt)
 };
 
@@ -23,7 +23,7 @@ struct CameraCalibration {
   int height = 0;                                          ///< [px]
   double fu = 0.0, fv = 0.0, cu = 0.0, cv = 0.0;           ///< [px]; the centre of the first pixel is (0, 0)
   LensModel lens = LensModel::radial_tangential;
-  std::array<double, 4> distortion{};
+  std::array<double, 5> distortion{};  ///< the fifth, k3, is 0 in a model of four
   double rate_hz = 0.0;
 };
 

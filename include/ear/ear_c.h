@@ -46,7 +46,7 @@ typedef struct {
   int32_t width, height; /* [px] */
   double fu, fv, cu, cv; /* [px]; the centre of the first pixel is (0, 0) */
   ear_lens lens;
-  double distortion[4]; /* OpenCV's order: k1 k2 p1 p2, or k1 k2 k3 k4 */
+  double distortion[5]; /* OpenCV's order: k1 k2 p1 p2 k3, or k1 k2 k3 k4 0 */
   double rate_hz;
 } ear_camera;
 

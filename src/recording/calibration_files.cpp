@@ -23,14 +23,22 @@ std::optional<LensModel> lens_model(const std::string& name) {
   return std::nullopt;
 }
 
-// Our models have four coefficients. ROS writes a fifth, k3, which is fine as long as it is zero.
-std::array<double, 4> distortion_coefficients(const YamlMap& map, const std::string& key) {
+// Four coefficients, or five with the k3 of ROS and OpenCV. Zeros behind them change nothing.
+std::array<double, 5> distortion_coefficients(const YamlMap& map, const std::string& key, LensModel lens) {
+  const bool fisheye = lens == LensModel::equidistant;
+  const std::size_t most = fisheye ? 4 : 5;
   const std::vector<double> values = map.numbers(key, 0);
-  if (values.size() < 4) throw map.error(key, std::to_string(values.size()) + " numbers, not 4");
-  if (std::any_of(values.begin() + 4, values.end(), [](double value) { return value != 0.0; })) {
-    throw map.error(key, "more than four coefficients that are not zero");
+  if (values.size() < 4)
+    throw map.error(key, std::to_string(values.size()) + " numbers, not 4" + (fisheye ? "" : " or 5"));
+  if (values.size() > most && std::any_of(values.begin() + static_cast<std::ptrdiff_t>(most), values.end(),
+                                          [](double value) { return value != 0.0; })) {
+    throw map.error(key, std::to_string(values.size()) + " coefficients, of which only the first " +
+                             (fisheye ? "four (k1, k2, k3, k4)" : "five (k1, k2, p1, p2, k3)") +
+                             " may be other than 0: no other model is known");
   }
-  return {values[0], values[1], values[2], values[3]};
+  std::array<double, 5> coefficients{};
+  std::copy_n(values.begin(), std::min(values.size(), most), coefficients.begin());
+  return coefficients;
 }
 
 int pixels(const YamlMap& map, double number) {
@@ -60,7 +68,7 @@ CameraCalibration read_lens(const YamlMap& map, const std::string& coefficients_
   camera.cu = intrinsics[2];
   camera.cv = intrinsics[3];
   camera.lens = *lens;
-  if (lens_name != "none") camera.distortion = distortion_coefficients(map, coefficients_key);
+  if (lens_name != "none") camera.distortion = distortion_coefficients(map, coefficients_key, *lens);
   camera.rate_hz = map.get_or("rate_hz", 0.0);
   return camera;
 }

@@ -40,4 +40,8 @@ struct Finding {
 /// positive.
 [[nodiscard]] std::vector<Finding> check_calibration(const Calibration& calibration);
 
+/// Are there enough sensors for an estimate? An error where there is neither a camera nor wheels: the velocity that
+/// inertia alone gives is soon anything. For `ear run` and `ear check` alike.
+[[nodiscard]] std::optional<Finding> check_sensors(const Calibration& calibration);
+
 }  // namespace ear

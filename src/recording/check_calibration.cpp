@@ -1,5 +1,8 @@
 #include <Eigen/LU>
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 #include <sstream>
 
 #include "src/recording/calibration_files.h"
@@ -51,6 +54,45 @@ void check_pose(const Eigen::Isometry3d& T, const std::string& where, Findings& 
   }
 }
 
+// Where the lens model folds: the largest distance from the principal point [focal lengths] that it maps to. Infinite
+// where it grows as far as a lens sees.
+double reach_of(const CameraCalibration& camera) {
+  constexpr double kStep = 0.01;
+  const std::array<double, 5>& k = camera.distortion;
+  const bool fisheye = camera.lens == LensModel::equidistant;
+  const double widest = fisheye ? 1.55 : 20.0;  // an angle [rad], or a tangent
+  double reach = 0.0;
+  for (double r = kStep; r < widest; r += kStep) {
+    const double r2 = r * r;
+    const double factor = fisheye ? 1.0 + r2 * (k[0] + r2 * (k[1] + r2 * (k[2] + r2 * k[3])))
+                                  : 1.0 + r2 * (k[0] + r2 * (k[1] + r2 * k[4]));
+    if (r * factor <= reach) return reach;
+    reach = r * factor;
+  }
+  return std::numeric_limits<double>::infinity();
+}
+
+void check_distortion(const CameraCalibration& camera, const std::string& name, Findings& findings) {
+  const std::string where = name + ": distortion_coefficients";
+  const std::array<double, 5>& k = camera.distortion;
+  if (!std::all_of(k.begin(), k.end(), [](double value) { return std::isfinite(value); })) {
+    findings.error(where, "not finite");
+    return;
+  }
+  if (camera.lens == LensModel::equidistant && k[4] != 0.0) {
+    findings.error(where, "the equidistant model has four");
+    return;
+  }
+  const double x = std::max(camera.cu, camera.width - 1 - camera.cu) / camera.fu;
+  const double y = std::max(camera.cv, camera.height - 1 - camera.cv) / camera.fv;
+  const double reach = reach_of(camera);
+  if (reach < std::hypot(x, y)) {
+    findings.warning(where, "the lens model folds " + Findings::text(std::round(reach * camera.fu)) +
+                                " px from the principal point, within the image: is the order " +
+                                (camera.lens == LensModel::equidistant ? "k1, k2, k3, k4?" : "k1, k2, p1, p2, k3?"));
+  }
+}
+
 void check_camera(const CameraCalibration& camera, const std::string& name, Findings& findings) {
   check_pose(camera.T_BC, name + ": T_BS", findings);
   if (camera.T_BC.matrix().isIdentity(1e-9)) {
@@ -65,7 +107,9 @@ void check_camera(const CameraCalibration& camera, const std::string& name, Find
   };
   if (!(camera.fu > 0.0 && camera.fv > 0.0)) {
     findings.error(name + ": intrinsics", "focal length is not positive");
-  } else if (absurd(camera.fu) || absurd(camera.fv)) {
+    return;
+  }
+  if (absurd(camera.fu) || absurd(camera.fv)) {
     findings.warning(name + ": intrinsics", "focal length " + Findings::text(camera.fu) + " px for an image " +
                                                 std::to_string(camera.width) + " px wide");
   } else if (std::abs(camera.fu - camera.fv) > 0.2 * camera.fu) {
@@ -73,7 +117,9 @@ void check_camera(const CameraCalibration& camera, const std::string& name, Find
   }
   if (!(camera.cu > 0.0 && camera.cu < camera.width && camera.cv > 0.0 && camera.cv < camera.height)) {
     findings.warning(name + ": intrinsics", "principal point lies outside of the image");
+    return;
   }
+  check_distortion(camera, name, findings);
 }
 
 void check_stereo(const CameraCalibration& left, const CameraCalibration& right, Findings& findings) {
@@ -137,6 +183,12 @@ std::vector<Finding> check_calibration(const Calibration& calibration) {
   if (calibration.encoder) check_encoder(*calibration.encoder, findings);
   if (calibration.lasers) check_lasers(*calibration.lasers, findings);
   return findings.list;
+}
+
+std::optional<Finding> check_sensors(const Calibration& calibration) {
+  if (!calibration.cameras.empty() || calibration.encoder) return std::nullopt;
+  return Finding{Severity::error, "cam0, encoder0",
+                 "neither a camera nor wheels: inertial samples and lasers alone do not give an estimate"};
 }
 
 }  // namespace ear

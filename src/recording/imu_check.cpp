@@ -11,7 +11,7 @@ constexpr double kLeastGyroRange = 2.0;    // [rad/s] 125 deg/s
 constexpr double kLeastAccelRange = 19.0;  // [m/s^2] 2 g
 constexpr std::size_t kClippedRun = 2;     // samples in a row with exactly the same extreme value
 
-// A second counts as rest if gyroscope and accelerometer hardly change and only gravity is felt.
+// A second is quiet if gyroscope and accelerometer hardly change and only gravity is felt.
 constexpr double kWindow = 1.0;            // [s]
 constexpr std::size_t kLeastSamples = 20;  // in a window
 constexpr double kRestGyroSpread = 0.02;   // [rad/s]
@@ -83,29 +83,30 @@ void ImuCheck::close_window() {
 
   const Vector6 mean = sum_ / n;
   const Vector6 spread = (sum_of_squares_ / n - mean.cwiseAbs2()).cwiseMax(0.0).cwiseSqrt();
-  const bool rest = spread.head<3>().maxCoeff() < kRestGyroSpread && spread.tail<3>().maxCoeff() < kRestAccelSpread &&
-                    mean.head<3>().norm() < kRestGyro && std::abs(mean.tail<3>().norm() - kGravity) < kRestAccel;
-  if (!rest) return;
+  const bool quiet = spread.head<3>().maxCoeff() < kRestGyroSpread && spread.tail<3>().maxCoeff() < kRestAccelSpread &&
+                     mean.head<3>().norm() < kRestGyro && std::abs(mean.tail<3>().norm() - kGravity) < kRestAccel;
+  if (!quiet) return;
 
   // Differences between neighbours leave out whatever moves slowly; their variance is twice that of one sample.
   const double dt = window_s_ / (n - 1.0);
   const Vector6 variance = sum_of_steps_ / (2.0 * (n - 1.0));
-  rest_noise_.push_back({std::sqrt(variance.head<3>().mean() * dt), std::sqrt(variance.tail<3>().mean() * dt)});
+  quiet_.push_back({window_start_ns_, last_->t_ns, std::sqrt(variance.head<3>().mean() * dt),
+                    std::sqrt(variance.tail<3>().mean() * dt)});
 }
 
-ImuReport ImuCheck::report() const {
+ImuReport ImuCheck::report(const Stood& stood) const {
   ImuReport report;
   for (const Extreme& extreme : extremes_) report.clipped += extreme.clipped;
   report.repeated = repeated_;
-  if (rest_noise_.empty()) return report;
 
   std::vector<double> gyro;
   std::vector<double> accel;
-  for (const auto& [gyro_noise, accel_noise] : rest_noise_) {
-    gyro.push_back(gyro_noise);
-    accel.push_back(accel_noise);
+  for (const QuietSecond& second : quiet_) {
+    if (!stood || !stood(second.begin_ns, second.end_ns)) continue;
+    gyro.push_back(second.gyro);
+    accel.push_back(second.accel);
   }
-  report.standing_noise = StandingNoise{median(gyro), median(accel), rest_noise_.size()};
+  if (!gyro.empty()) report.standing_noise = StandingNoise{median(gyro), median(accel), gyro.size()};
   return report;
 }
 

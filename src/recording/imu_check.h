@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstddef>
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -21,14 +22,19 @@ struct StandingNoise {
 struct ImuReport {
   std::size_t clipped = 0;                      ///< samples where an axis stays at its extreme value
   std::size_t repeated = 0;                     ///< samples whose six values equal those before
-  std::optional<StandingNoise> standing_noise;  ///< nothing if the vehicle never stands
+  std::optional<StandingNoise> standing_noise;  ///< nothing where the vehicle was never seen to stand
 };
 
 /// Looks at every sample once, in constant memory.
 class ImuCheck {
  public:
   void add(const ImuSample& sample);
-  [[nodiscard]] ImuReport report() const;
+
+  /// Did the vehicle stand from begin to end? The IMU alone is as quiet at constant speed.
+  using Stood = std::function<bool(TimeNs begin_ns, TimeNs end_ns)>;
+
+  /// Without `stood` nothing is said of the noise at rest.
+  [[nodiscard]] ImuReport report(const Stood& stood = {}) const;
 
  private:
   using Vector6 = Eigen::Matrix<double, 6, 1>;
@@ -38,6 +44,14 @@ class ImuCheck {
     double value = 0.0;
     std::size_t run = 0;      // samples in a row, now
     std::size_t clipped = 0;  // samples in all runs that are long enough
+  };
+
+  // A second in which little changed.
+  struct QuietSecond {
+    TimeNs begin_ns = 0;
+    TimeNs end_ns = 0;
+    double gyro = 0.0;  // density, as StandingNoise
+    double accel = 0.0;
   };
 
   void follow_extreme(Extreme& extreme, double value, double floor);
@@ -55,7 +69,7 @@ class ImuCheck {
   Vector6 sum_of_squares_ = Vector6::Zero();
   Vector6 sum_of_steps_ = Vector6::Zero();  // squared differences between neighbours
   double window_s_ = 0.0;
-  std::vector<std::array<double, 2>> rest_noise_;  // gyro, accel densities of each second at rest
+  std::vector<QuietSecond> quiet_;
 };
 
 }  // namespace ear

@@ -5,6 +5,7 @@
 #include <string>
 #include <utility>
 
+#include "src/log/log.h"
 #include "src/recording/calibration_files.h"
 #include "src/recording/frame_list.h"
 #include "src/recording/image_file.h"
@@ -128,6 +129,7 @@ class Recording::Impl {
       if (times[i] && (!times[earliest] || *times[i] < *times[earliest])) earliest = i;
     }
     if (!times[earliest]) return std::nullopt;
+    log_new_warnings();
     switch (earliest) {
       case 0:
         return take(next_imu_, &Impl::refill_imu);
@@ -150,6 +152,14 @@ class Recording::Impl {
     if (options.mono && calibration.cameras.size() > 1) calibration.cameras.resize(1);
     require_usable(calibration, mav0_, options.accept_bad_calibration, warnings_);
     return calibration;
+  }
+
+  // The first of each kind, where it happened; how often it was is known at the end.
+  void log_new_warnings() {
+    for (; logged_ < warnings_.list().size(); ++logged_) {
+      const Warning& warning = warnings_.list()[logged_];
+      log_info(warning.kind + ", at " + warning.first);
+    }
   }
 
   template <typename T>
@@ -179,6 +189,7 @@ class Recording::Impl {
   }
 
   Warnings warnings_;
+  std::size_t logged_ = 0;  // kinds of them
   fs::path mav0_;
   Calibration calibration_;
   TimeSpan span_;

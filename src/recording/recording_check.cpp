@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "src/recording/recording.h"
+#include "src/recording/standing_watch.h"
 
 namespace ear {
 namespace {
@@ -30,7 +31,9 @@ class Check {
       options.calibration_files = files;
       options.accept_bad_calibration = true;
       Recording recording(folder, options);
+      report_.calibration = recording.calibration();
       report_.findings = check_calibration(recording.calibration());
+      if (const auto missing = check_sensors(recording.calibration())) report_.findings.push_back(*missing);
       read(recording);
       describe_streams(recording.calibration());
       judge_imu(recording.calibration().imu);
@@ -44,14 +47,19 @@ class Check {
  private:
   void read(Recording& recording) {
     const std::vector<CameraCalibration>& cameras = recording.calibration().cameras;
+    const auto camera_offset_ns = static_cast<TimeNs>(std::llround(1e9 * recording.calibration().camera_time_offset));
     const auto sort = Overloaded{[&](const ImuSample& s) {
                                    imu_timing_.add(s.t_ns);
                                    imu_.add(s);
                                  },
-                                 [&](const EncoderSample& s) { encoder_timing_.add(s.t_ns); },
+                                 [&](const EncoderSample& s) {
+                                   encoder_timing_.add(s.t_ns);
+                                   standing_.add(s, *recording.calibration().encoder);
+                                 },
                                  [&](const LaserSample& s) { laser_timing_.add(s.t_ns); },
                                  [&](const RecordedFrame& s) {
                                    camera_timing_.add(s.t_ns);
+                                   standing_.add(s.t_ns + camera_offset_ns, s.left);
                                    judge_size("cam0", s.left, cameras.front(), left_seen_);
                                    judge_size("cam1", s.right, cameras.back(), right_seen_);
                                  }};
@@ -115,7 +123,7 @@ class Check {
   }
 
   void judge_imu(const ImuCalibration& stated) {
-    report_.imu = imu_.report();
+    report_.imu = imu_.report([this](TimeNs begin_ns, TimeNs end_ns) { return standing_.stood(begin_ns, end_ns); });
     if (report_.imu.clipped > 0) warn("imu0", std::to_string(report_.imu.clipped) + " clipped samples");
     const auto count = static_cast<double>(imu_timing_.report().count);
     if (static_cast<double>(report_.imu.repeated) > kRepeatedShare * count) {
@@ -141,6 +149,7 @@ class Check {
   StreamTiming laser_timing_;
   StreamTiming camera_timing_;
   ImuCheck imu_;
+  StandingWatch standing_;
   bool left_seen_ = false;
   bool right_seen_ = false;
 };

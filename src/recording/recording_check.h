@@ -25,8 +25,9 @@ struct StreamReport {
 struct RecordingReport {
   std::vector<StreamReport> streams;
   ImuReport imu;
-  std::vector<Finding> findings;  ///< errors make the recording unusable
-  std::vector<Warning> warnings;  ///< what was left out while reading
+  std::vector<Finding> findings;           ///< errors make the recording unusable
+  std::vector<Warning> warnings;           ///< what was left out while reading
+  std::optional<Calibration> calibration;  ///< nothing if it cannot be read
 
   /// No finding is an error.
   [[nodiscard]] bool usable() const;

@@ -78,6 +78,42 @@ const char* mode_text(const FrameStatistics& frame) {
   return frame.on_ground ? "rolling" : "free";
 }
 
+// 16 numbers row by row, as sensor.yaml takes them.
+nlohmann::ordered_json to_json(const Eigen::Isometry3d& T) {
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (Eigen::Index row = 0; row < 4; ++row) {
+    for (Eigen::Index column = 0; column < 4; ++column) list.push_back(T.matrix()(row, column));
+  }
+  return list;
+}
+
+// All that is learned while running: of the sensors that there are.
+nlohmann::ordered_json to_json(const Calibration& calibration) {
+  nlohmann::ordered_json json = nlohmann::ordered_json::object();
+  const std::vector<CameraCalibration>& cameras = calibration.cameras;
+  if (!cameras.empty()) {
+    json["camera_time_offset"] = calibration.camera_time_offset;
+    json["T_BC0"] = to_json(cameras[0].T_BC);
+  }
+  if (cameras.size() > 1) {
+    json["T_BC1"] = to_json(cameras[1].T_BC);
+    json["T_C0C1"] = to_json(cameras[0].T_BC.inverse(Eigen::Isometry) * cameras[1].T_BC);
+  }
+  if (calibration.encoder) {
+    json["wheel_radius_left"] = calibration.encoder->wheel_radius[0];
+    json["wheel_radius_right"] = calibration.encoder->wheel_radius[1];
+    json["track_width"] = calibration.encoder->track_width;
+    json["T_BO"] = to_json(calibration.encoder->T_BO);
+  }
+  if (calibration.lasers) {
+    json["beams"] = nlohmann::ordered_json::array();
+    for (const LaserBeam& beam : calibration.lasers->beams) {
+      json["beams"].push_back({{"name", beam.name}, {"direction", {beam.d_B.x(), beam.d_B.y(), beam.d_B.z()}}});
+    }
+  }
+  return json;
+}
+
 nlohmann::ordered_json to_json(const std::vector<Warning>& warnings) {
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   for (const Warning& w : warnings) list.push_back({{"kind", w.kind}, {"count", w.count}, {"first", w.first}});
@@ -160,8 +196,7 @@ void write_summary(const RunSummary& summary, const std::filesystem::path& file)
   for (const auto& [name, count] : summary.counts) json["counts"][name] = count;
   json["stage_times_s"] = nlohmann::ordered_json::object();
   for (const auto& [name, seconds] : summary.stage_times_s) json["stage_times_s"][name] = seconds;
-  json["calibration"] = nlohmann::ordered_json::object();
-  for (const auto& [name, value] : summary.calibration) json["calibration"][name] = value;
+  json["calibration"] = to_json(summary.calibration);
   json["health"] = nlohmann::ordered_json::array();
   for (const HealthChange& change : summary.health)
     json["health"].push_back({{"t_ns", change.t_ns}, {"is", change.text}});

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "ear/calibration.h"
 #include "ear/estimate.h"
 #include "src/recording/warnings.h"
 
@@ -62,7 +63,7 @@ struct RunSummary {
   double duration_s = 0.0;                                    ///< length of the recording [s]
   double wall_time_s = 0.0;                                   ///< time that the run took [s]
   std::vector<std::pair<std::string, double>> stage_times_s;  ///< whole run, per stage [s]
-  std::vector<std::pair<std::string, double>> calibration;    ///< what was learned while running, SI units
+  Calibration calibration;                                    ///< with what was learned while running
   std::vector<HealthChange> health;                           ///< every change, the first ones of very many
   std::vector<Warning> warnings;
 };

@@ -87,6 +87,22 @@ TEST_CASE("read: a states.csv is read by the names in its header") {
   CHECK(estimate.covariance[0](5, 5) == 55.0);
 }
 
+TEST_CASE("read: comments around the header are no columns") {
+  const TemporaryFolder folder("comments");
+  const std::string named = "t_ns,q_w,q_x,q_y,q_z,p_x,p_y,p_z";  // not EuRoC's order: the names count
+  const auto position = [&](const std::string& text) {
+    return read_estimate(folder.write("a.csv", text)).poses.at(0).p_WB;
+  };
+  const Eigen::Vector3d expected(7, 8, 9);
+  CHECK(position("# made by hand, in a hurry\n" + named + "\n1,1,0,0,0,7,8,9\n") == expected);
+  CHECK(position(named + "\n# made by hand, in a hurry\n1,1,0,0,0,7,8,9\n") == expected);
+  CHECK(position("#" + named + "\n# units: ns, m\n#\n1,1,0,0,0,7,8,9\n") == expected);
+  CHECK(position("# without a header, in EuRoC's order\n1,7,8,9,1,0,0,0\n") == expected);
+  CHECK(position("# two comments, of which\n# none, is, a header\n1,7,8,9,1,0,0,0,5,5\n") == expected);
+  CHECK(complaint("a.csv", "# made by hand, in a hurry\n#" + named + "\n1,1,0,0,0,7,8\n") ==
+        ":3: 7 fields where 8 are expected: the line is torn");
+}
+
 TEST_CASE("read: the ground of a states.csv, known or not") {
   const TemporaryFolder folder("ground");
   const std::string columns = "t_ns,p_x,p_y,p_z,q_w,q_x,q_y,q_z,on_ground";

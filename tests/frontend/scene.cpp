@@ -138,8 +138,8 @@ std::vector<CameraCalibration> test_stereo_pair(LensModel lens) {
   left.cu = 158.3;
   left.cv = 121.7;
   left.lens = lens;
-  left.distortion = lens == LensModel::equidistant ? std::array<double, 4>{-0.01, 0.02, -0.01, 0.002}
-                                                   : std::array<double, 4>{-0.05, 0.04, 0.0006, -0.0004};
+  left.distortion = lens == LensModel::equidistant ? std::array<double, 5>{-0.01, 0.02, -0.01, 0.002}
+                                                   : std::array<double, 5>{-0.05, 0.04, 0.0006, -0.0004};
   CameraCalibration right = left;
   right.fu = 201.5;
   right.cu = 161.2;

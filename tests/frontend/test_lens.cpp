@@ -22,6 +22,13 @@ CameraCalibration euroc() {
   return c;
 }
 
+// Wide, with k3 as ROS and OpenCV write it.
+CameraCalibration plumb_bob() {
+  CameraCalibration c = euroc();
+  c.distortion = {-0.30, 0.11, 0.0006, -0.0004, -0.018};
+  return c;
+}
+
 CameraCalibration fisheye() {
   CameraCalibration c = euroc();
   c.lens = LensModel::equidistant;
@@ -43,7 +50,7 @@ void for_each_pixel_on_a_grid(const CameraCalibration& camera, Check&& check) {
 }  // namespace
 
 TEST_CASE("lens: pixels come back from their rays, to the corners") {
-  for (const CameraCalibration& camera : {euroc(), fisheye()}) {
+  for (const CameraCalibration& camera : {euroc(), plumb_bob(), fisheye()}) {
     const Lens lens(camera);
     for_each_pixel_on_a_grid(camera, [&](const Eigen::Vector2d& pixel) {
       CAPTURE(pixel);
@@ -62,16 +69,17 @@ TEST_CASE("lens: pixels come back from their rays, to the corners") {
 }
 
 TEST_CASE("lens: the models are OpenCV's") {
-  for (const CameraCalibration& camera : {euroc(), fisheye()}) {
+  for (const CameraCalibration& camera : {euroc(), plumb_bob(), fisheye()}) {
     const Lens lens(camera);
     const cv::Matx33d K(camera.fu, 0.0, camera.cu, 0.0, camera.fv, camera.cv, 0.0, 0.0, 1.0);
-    const cv::Vec4d k(camera.distortion[0], camera.distortion[1], camera.distortion[2], camera.distortion[3]);
+    const std::vector<double> k(camera.distortion.begin(), camera.distortion.end());
+    const std::vector<double> four(k.begin(), k.begin() + 4);
     for (double x = -0.8; x <= 0.8; x += 0.2) {
       for (double y = -0.5; y <= 0.5; y += 0.1) {
         const std::vector<cv::Point3d> points{{x, y, 1.0}};
         std::vector<cv::Point2d> pixels;
         if (camera.lens == LensModel::equidistant) {
-          cv::fisheye::projectPoints(points, pixels, cv::Vec3d(), cv::Vec3d(), K, k);
+          cv::fisheye::projectPoints(points, pixels, cv::Vec3d(), cv::Vec3d(), K, four);
         } else {
           cv::projectPoints(points, cv::Vec3d(), cv::Vec3d(), K, k, pixels);
         }
@@ -90,6 +98,30 @@ TEST_CASE("lens: rays beyond the fold of the polynomial see no pixel") {
   CHECK(lens.to_pixel({0.85, 0.0}));
   CHECK_FALSE(lens.to_pixel({1.2, 0.0}));
   CHECK_FALSE(lens.to_normalized({camera.cu + 0.7 * camera.fu, camera.cv}));
+
+  camera.distortion = {-0.4, 0.0, 0.0, 0.0, 0.2};  // r^7 bends it back: no fold
+  CHECK(Lens(camera).to_pixel({1.2, 0.0}));
+  camera.distortion = {0.0, 0.0, 0.0, 0.0, -0.3};  // folds at r = 0.88
+  CHECK(Lens(camera).to_pixel({0.85, 0.0}));
+  CHECK_FALSE(Lens(camera).to_pixel({0.9, 0.0}));
+}
+
+TEST_CASE("lens: four coefficients give the bits that they gave before there was a fifth") {
+  const CameraCalibration camera = euroc();
+  const Lens lens(camera);
+  const auto& k = camera.distortion;
+  for (double x = -0.8; x <= 0.8; x += 0.1) {
+    for (double y = -0.5; y <= 0.5; y += 0.1) {
+      const double r2 = x * x + y * y;
+      const double radial = 1.0 + r2 * (k[0] + r2 * k[1]);
+      const Eigen::Vector2d distorted(x * radial + 2.0 * k[2] * x * y + k[3] * (r2 + 2.0 * x * x),
+                                      y * radial + k[2] * (r2 + 2.0 * y * y) + 2.0 * k[3] * x * y);
+      const auto pixel = lens.to_pixel({x, y});
+      REQUIRE(pixel);
+      CHECK(pixel->x() == distorted.x() * camera.fu + camera.cu);
+      CHECK(pixel->y() == distorted.y() * camera.fv + camera.cv);
+    }
+  }
 }
 
 TEST_CASE("lens: a calibration that cannot be is refused") {
@@ -102,11 +134,17 @@ TEST_CASE("lens: a calibration that cannot be is refused") {
   camera = euroc();
   camera.distortion[1] = std::numeric_limits<double>::quiet_NaN();
   CHECK_THROWS_AS(Lens{camera}, std::invalid_argument);
+  camera = euroc();
+  camera.distortion[4] = std::numeric_limits<double>::quiet_NaN();
+  CHECK_THROWS_AS(Lens{camera}, std::invalid_argument);
+  camera = fisheye();
+  camera.distortion[4] = 0.1;  // the equidistant model has four
+  CHECK_THROWS_AS(Lens{camera}, std::invalid_argument);
 }
 
 TEST_CASE("lens: NaN is nowhere") {
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  for (const CameraCalibration& camera : {euroc(), fisheye()}) {
+  for (const CameraCalibration& camera : {euroc(), plumb_bob(), fisheye()}) {
     CHECK_FALSE(Lens(camera).to_normalized({nan, 10.0}));
     CHECK_FALSE(Lens(camera).to_pixel({nan, 0.1}));
   }

@@ -89,6 +89,7 @@ struct Drive : simulator::Film {
     options.seed = 11;
     options.duration = 3.5;
     options.camera_rate_hz = 6.0;
+    options.k3 = -0.03;
     return options;
   }
 
@@ -401,6 +402,8 @@ TEST_CASE("C interface: what cannot be used is refused with its reason") {
   CHECK(reason_of([](C& c, S&) { c.cameras[1].width = 0; }).find("width") != std::string::npos);
   CHECK(reason_of([](C& c, S&) { c.cameras[0].fu = -1.0; }).find("focal") != std::string::npos);
   CHECK(reason_of([](C& c, S&) { std::memset(&c.cameras[0].lens, 7, 1); }) == "lens: no such choice");
+  const auto fisheye_with_k3 = [](C& c, S&) { c.cameras[0].lens = EAR_LENS_EQUIDISTANT; };
+  CHECK(reason_of(fisheye_with_k3).find("distortion") != std::string::npos);
   CHECK(reason_of([](C& c, S&) { c.imu_rate_hz = std::nan(""); }).find("rate of the IMU") != std::string::npos);
   CHECK(reason_of([](C&, S& s) { s.window = 1; }).find("filter.window") != std::string::npos);
   CHECK(reason_of([](C&, S& s) { s.frame_slots = 0; }).find("frame_slots") != std::string::npos);

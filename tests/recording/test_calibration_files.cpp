@@ -68,7 +68,7 @@ TEST_CASE("calibration: all keys of sensor.yaml") {
   CHECK(c.cameras[0].fv == 10.25);
   CHECK(c.cameras[0].cu == 8.0);
   CHECK(c.cameras[0].cv == 6.0);
-  CHECK(c.cameras[0].distortion == std::array<double, 4>{0.1, 0.2, 0.3, 0.4});
+  CHECK(c.cameras[0].distortion == std::array<double, 5>{0.1, 0.2, 0.3, 0.4, 0.0});
   CHECK(c.cameras[0].rate_hz == 10.0);
   CHECK(c.imu.rate_hz == 100.0);
   CHECK(c.imu.gyro_noise == 0.001);
@@ -112,19 +112,39 @@ TEST_CASE("calibration: names of lens models") {
     CHECK(lens(name).lens == LensModel::radial_tangential);
   }
   for (const char* name : {"equidistant", "kannala_brandt4"}) CHECK(lens(name).lens == LensModel::equidistant);
-  CHECK(lens("none").distortion == std::array<double, 4>{});
+  CHECK(lens("none").distortion == std::array<double, 5>{});
   const std::string error = input_error_of([&] { lens("fov"); });
   CHECK(contains(error, "cam0/sensor.yaml:15: distortion_model: 'fov' is not known"));
 }
 
-TEST_CASE("calibration: a fifth coefficient must be zero") {
+TEST_CASE("calibration: the fifth coefficient is k3; there is no sixth, and none of the equidistant model") {
   const TempFolder folder;
   write_full_recording(folder.path());
   const fs::path file = folder / "cam0/sensor.yaml";
-  replace_in(file, "0.4]", "0.4, 0.0]");
-  CHECK(load(folder.path()).cameras[0].distortion[3] == 0.4);
-  replace_in(file, "0.4, 0.0]", "0.4, 0.5]");
-  CHECK(contains(input_error_of([&] { load(folder.path()); }), "distortion_coefficients: more than four"));
+  const auto with = [&](const std::string& lens, const std::string& coefficients) {
+    write_text(file, camera_yaml("0.05", lens));
+    replace_in(file, "0.1, 0.2, 0.3, 0.4", coefficients);
+    return load(folder.path()).cameras[0];
+  };
+  const auto error = [&](const std::string& lens, const std::string& coefficients) {
+    return input_error_of([&] { with(lens, coefficients); });
+  };
+  CHECK(with("plumb_bob", "0.1, 0.2, 0.3, 0.4, 0.5").distortion == std::array<double, 5>{0.1, 0.2, 0.3, 0.4, 0.5});
+  CHECK(with("plumb_bob", "0.1, 0.2, 0.3, 0.4, 0.5, 0.0").distortion[4] == 0.5);  // a zero changes nothing
+  CHECK(contains(error("plumb_bob", "0.1, 0.2, 0.3, 0.4, 0.5, 0.6"),
+                 "cam0/sensor.yaml:16: distortion_coefficients: 6 coefficients, of which only the first five"));
+  CHECK(contains(error("plumb_bob", "0.1, 0.2, 0.3"), "distortion_coefficients: 3 numbers, not 4 or 5"));
+  CHECK(with("equidistant", "0.1, 0.2, 0.3, 0.4, 0.0").distortion[3] == 0.4);
+  CHECK(contains(error("equidistant", "0.1, 0.2, 0.3, 0.4, 0.5"), "5 coefficients, of which only the first four"));
+}
+
+TEST_CASE("kalibr: radtan with k3") {
+  const TempFolder folder;
+  write_text(folder / "chain.yaml", kCamchain);
+  write_text(folder / "imu.yaml", kKalibrImu);
+  replace_in(folder / "chain.yaml", "[0.0, 0.0, 0.0, 0.0]\n  distortion_model",
+             "[-0.3, 0.1, 0.0, 0.0, -0.02]\n  distortion_model");
+  CHECK(load_kalibr(folder / "chain.yaml", folder / "imu.yaml").cameras[1].distortion[4] == -0.02);
 }
 
 TEST_CASE("calibration: errors name file, line and key") {

@@ -1,5 +1,7 @@
 #include <doctest/doctest.h>
 
+#include <cmath>
+
 #include "src/recording/calibration_files.h"
 
 using namespace ear;
@@ -90,8 +92,33 @@ TEST_CASE("check_calibration: a camera") {
   check_one(c, Severity::warning, "cam0: intrinsics", "principal point");
 
   c = good();
+  c.cameras[0].distortion = {-0.3, 0.1, 0.0, 0.0, -0.01};
+  CHECK(check_calibration(c).empty());
+  c.cameras[0].distortion = {-0.3, 0.1, 0.0, 0.0, -0.3};
+  check_one(c, Severity::warning, "cam0: distortion_coefficients", "folds 247 px from the principal point");
+  c.cameras[0].distortion[4] = std::nan("");
+  check_one(c, Severity::error, "cam0: distortion_coefficients", "not finite");
+  c.cameras[0].distortion = {-0.01, 0.02, -0.01, 0.002, 0.1};
+  c.cameras[0].lens = LensModel::equidistant;
+  check_one(c, Severity::error, "cam0: distortion_coefficients", "four");
+  c.cameras[0].distortion[4] = 0.0;
+  CHECK(check_calibration(c).empty());
+
+  c = good();
   c.cameras[0].width = 0;
   check_one(c, Severity::error, "cam0: resolution", "not positive");
+}
+
+TEST_CASE("check_sensors: a camera or wheels are needed") {
+  Calibration c = good();
+  CHECK_FALSE(check_sensors(c));
+  c.cameras.clear();
+  CHECK_FALSE(check_sensors(c));
+  c.encoder.reset();
+  REQUIRE(check_sensors(c));  // lasers alone
+  CHECK((check_sensors(c)->severity == Severity::error));
+  c.cameras = good().cameras;
+  CHECK_FALSE(check_sensors(c));
 }
 
 TEST_CASE("check_calibration: noise, wheels, beams") {

@@ -40,6 +40,20 @@ std::vector<std::string> settings_of(const Config& config) {
   return out;
 }
 
+// The keys that the comment at the head of the file names: "#   filter.impact.accel_range    why".
+std::vector<std::string> keys_at_head(const fs::path& file) {
+  std::vector<std::string> keys;
+  std::ifstream stream(file);
+  for (std::string line; std::getline(stream, line) && !line.empty();) {
+    std::istringstream words(line);
+    std::string hash;
+    std::string key;
+    words >> hash >> key;
+    if (line.rfind("#   ", 0) == 0) keys.push_back(key);
+  }
+  return keys;
+}
+
 // Changes every setting, so that a key that is not loaded or saved shows.
 template <typename T>
 void change_all(T& settings) {
@@ -97,6 +111,19 @@ TEST_CASE("config: the shipped file states every setting and its default") {
     const std::string path = setting.substr(0, setting.find('='));
     CAPTURE(path);
     CHECK(contains(text, "  " + path.substr(path.rfind('.') + 1) + ":"));
+  }
+}
+
+TEST_CASE("config: the keys that a new vehicle should look at exist, and the documentation explains them") {
+  const std::vector<std::string> keys = keys_at_head(kShipped);
+  CHECK((keys.size() >= 5 && keys.size() <= 7));
+  const std::string documentation = read_text(fs::path(EAR_SOURCE_DIR) / "docs/recordings.md");
+  for (const std::string& key : keys) {
+    CAPTURE(key);
+    const std::vector<std::string> settings = settings_of(Config{});
+    CHECK(std::any_of(settings.begin(), settings.end(),
+                      [&](const std::string& setting) { return setting.rfind(key + "=", 0) == 0; }));
+    CHECK(contains(documentation, "`" + key + "`"));
   }
 }
 

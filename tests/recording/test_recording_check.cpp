@@ -1,9 +1,13 @@
 #include <doctest/doctest.h>
 
 #include <cmath>
+#include <functional>
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
 #include <random>
 
 #include "src/recording/recording_check.h"
+#include "src/recording/standing_watch.h"
 #include "tests/recording/support.h"
 
 using namespace ear;
@@ -84,11 +88,78 @@ TEST_CASE("imu check: noise at rest, not in motion") {
     sample.gyro_B.z() += std::sin(0.01 * i);
     motion.add(sample);
   }
-  REQUIRE(rest.report().standing_noise);
-  CHECK(rest.report().standing_noise->windows >= 9);
-  CHECK(relative_error(rest.report().standing_noise->gyro, 1e-3) < 0.05);
-  CHECK(relative_error(rest.report().standing_noise->accel, 1e-2) < 0.05);
-  CHECK_FALSE(motion.report().standing_noise);
+  const auto always = [](TimeNs, TimeNs) { return true; };
+  const std::optional<StandingNoise> noise = rest.report(always).standing_noise;
+  REQUIRE(noise);
+  CHECK(noise->windows >= 9);
+  CHECK(relative_error(noise->gyro, 1e-3) < 0.05);
+  CHECK(relative_error(noise->accel, 1e-2) < 0.05);
+  CHECK_FALSE(motion.report(always).standing_noise);
+
+  // A quiet second is one of rest only where somebody saw the vehicle stand.
+  CHECK_FALSE(rest.report().standing_noise);
+  const auto first_half = [](TimeNs, TimeNs end_ns) { return end_ns < 5'000'000'000; };
+  CHECK(rest.report(first_half).standing_noise->windows == 5);
+}
+
+TEST_CASE("standing: wheels that rest, turn, are silent, and wrap") {
+  EncoderCalibration wheels;  // 262144 counts for 0.47 m, wrapping
+  StandingWatch watch;
+  const auto until = [](double t) { return static_cast<TimeNs>(1e9 * t); };
+  CHECK_FALSE(watch.stood(0, until(1.0)));  // nobody saw anything
+  for (int i = 0; i < 1000; ++i) {
+    if (i >= 700 && i < 800) continue;                   // silent
+    const int path = i < 300 || i >= 600 ? 0 : i - 300;  // cm: rolls from 3 to 6 s
+    const std::int64_t counts = 262143 + 5563LL * path + (i % 3);
+    watch.add({until(0.01 * i), counts % 262144, 1000 + i % 2}, wheels);
+  }
+  CHECK(watch.stood(0, until(1.0)));
+  CHECK(watch.stood(until(1.9), until(2.9)));
+  CHECK_FALSE(watch.stood(until(2.5), until(3.5)));
+  CHECK_FALSE(watch.stood(until(4.0), until(5.0)));  // at constant speed
+  CHECK_FALSE(watch.stood(until(6.5), until(7.5)));
+  CHECK(watch.stood(until(8.1), until(9.1)));
+  CHECK_FALSE(watch.stood(until(20.0), until(21.0)));
+}
+
+TEST_CASE("standing: images that change, all or a little, and a covered lens") {
+  std::mt19937 rng{5};
+  cv::Mat scene(240, 640, CV_8UC1);
+  cv::randu(scene, 40, 210);
+  cv::blur(scene, scene, {31, 31});
+  cv::normalize(scene, scene, 30, 220, cv::NORM_MINMAX);
+  const auto until = [](double t) { return static_cast<TimeNs>(1e9 * t); };
+  const auto seen = [&](const std::function<cv::Mat(int)>& image) {
+    StandingWatch watch;
+    std::normal_distribution<float> noise(0.0F, 2.0F);
+    for (int i = 0; i < 30; ++i) {
+      cv::Mat picture = image(i).clone();
+      picture.forEach<std::uint8_t>([&](std::uint8_t& pixel, const int*) {
+        pixel = cv::saturate_cast<std::uint8_t>(static_cast<float>(pixel) + noise(rng));
+      });
+      watch.add(until(0.1 * i), {picture.data, picture.cols, picture.rows, static_cast<std::ptrdiff_t>(picture.step)});
+    }
+    return watch.stood(until(1.0), until(2.0));
+  };
+  const cv::Rect left(0, 0, 320, 240);
+  CHECK(seen([&](int) { return scene(left); }));
+  CHECK(seen([&](int i) { return cv::Mat(scene(left) + cv::Scalar::all(i % 5)); }));  // exposure
+  CHECK(seen([&](int i) {
+    cv::Mat image = scene(left).clone();
+    image({i * 8, 100, 24, 24}) = cv::Scalar::all(255);  // something small passes by
+    return image;
+  }));
+  CHECK_FALSE(seen([&](int i) { return scene(left + cv::Point(i, 0)); }));  // 10 px a second
+  CHECK_FALSE(seen([&](int) { return cv::Mat(240, 320, CV_8UC1, cv::Scalar::all(20)); }));
+
+  // Wheels that stand while the image moves: in the air.
+  StandingWatch both;
+  for (int i = 0; i < 30; ++i) {
+    const cv::Mat picture = scene(left + cv::Point(8 * i, 0)).clone();
+    both.add(until(0.1 * i), {picture.data, picture.cols, picture.rows, static_cast<std::ptrdiff_t>(picture.step)});
+    both.add({until(0.1 * i), 7, 7}, EncoderCalibration{});
+  }
+  CHECK_FALSE(both.stood(until(1.0), until(2.0)));
 }
 
 TEST_CASE("check: a good recording") {

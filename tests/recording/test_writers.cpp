@@ -128,6 +128,42 @@ TEST_CASE("summary: valid JSON with all that was said") {
   CHECK(json["warnings"][0]["first"] == summary.warnings[0].first);
 }
 
+TEST_CASE("summary: all that online calibration moves") {
+  const TempFolder folder;
+  const auto written = [&](const Calibration& calibration) {
+    RunSummary summary;
+    summary.calibration = calibration;
+    write_summary(summary, folder / "summary.json");
+    return nlohmann::json::parse(read_text(folder / "summary.json"))["calibration"];
+  };
+  CHECK(written({}).empty());
+
+  Calibration learned;
+  learned.cameras.resize(2);
+  learned.cameras[0].T_BC.translation() << 0.1, 0.05, 0.0;
+  learned.cameras[0].T_BC.linear() << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+  learned.cameras[1].T_BC = learned.cameras[0].T_BC * Eigen::Translation3d(0.08, 0.01, 0.02);
+  learned.camera_time_offset = 0.004;
+  learned.encoder = EncoderCalibration{};
+  learned.encoder->T_BO.translation() << 0.0, 0.0, -0.05;
+  learned.encoder->wheel_radius = {0.0751, 0.0749};
+  learned.lasers = LaserCalibration{};
+  learned.lasers->beams = {{"rear", {0.0, 0.0, 0.0}, {0.6, 0.0, -0.8}}};
+  const auto json = written(learned);
+  const auto pose = [&](const char* name) { return json[name].get<std::vector<double>>(); };
+  CHECK(pose("T_BC0") == std::vector<double>{0, 0, 1, 0.1, -1, 0, 0, 0.05, 0, -1, 0, 0, 0, 0, 0, 1});
+  REQUIRE(pose("T_C0C1").size() == 16);
+  CHECK(pose("T_C0C1")[3] == doctest::Approx(0.08));
+  CHECK(pose("T_C0C1")[11] == doctest::Approx(0.02));
+  CHECK(pose("T_BC1")[3] == doctest::Approx(0.12));
+  CHECK(pose("T_BO")[11] == -0.05);
+  CHECK(json["camera_time_offset"] == 0.004);
+  CHECK(json["wheel_radius_right"] == 0.0749);
+  CHECK(json["track_width"] == 0.4);
+  CHECK(json["beams"][0]["name"] == "rear");
+  CHECK(json["beams"][0]["direction"] == std::vector<double>{0.6, 0.0, -0.8});
+}
+
 TEST_CASE("writers: a file that cannot be created is an error that names it") {
   const TempFolder folder;
   CHECK(contains(input_error_of([&] { TumWriter(folder / "no/such/folder/a.tum"); }), "a.tum"));

@@ -68,6 +68,7 @@ TEST_CASE("recording: the reader gets back calibration and samples") {
   const TemporaryFolder folder;
   Options options = short_drive(41);
   options.duration = 4.0;
+  options.k3 = -0.0125;
   const Simulation simulation(options);
   write_recording(simulation, folder / "r");
 
@@ -87,6 +88,8 @@ TEST_CASE("recording: the reader gets back calibration and samples") {
     CHECK((read.lasers->beams[i].d_B - told.lasers->beams[i].d_B).norm() < 1e-9);
     CHECK((read.lasers->beams[i].p_BL - told.lasers->beams[i].p_BL).norm() < 1e-8);
   }
+
+  CHECK(read.cameras[0].distortion == told.cameras[0].distortion);
 
   std::size_t imu = 0;
   std::size_t encoders = 0;

@@ -69,6 +69,11 @@ TEST_CASE("lens: the models by their formulas") {
   const double y = -0.25 * radial + 0.001 * (0.3125 + 2.0 * 0.0625) + 2.0 * 0.002 * 0.5 * -0.25;
   CHECK((to_pixel(camera, {0.5, -0.25}) - Eigen::Vector2d(400.0 * x + 320.0, 410.0 * y + 240.0)).norm() < 1e-9);
 
+  camera.distortion = {0.0, 0.0, 0.0, 0.0, 0.5};  // k3 alone: r2^3 = 0.030517578125
+  CHECK((to_pixel(camera, {0.5, -0.25}) - (1.0 + 0.5 * 0.030517578125) * Eigen::Vector2d(400.0 * 0.5, 410.0 * -0.25) -
+         Eigen::Vector2d(320.0, 240.0))
+            .norm() < 1e-9);
+
   camera.lens = ear::LensModel::equidistant;
   camera.distortion = {0.0, 0.0, 0.0, 0.0};
   // 45 degrees to the right: the pixel is f * pi / 4 away.

@@ -15,8 +15,9 @@ LAYERS = {
     "filter/": ["filter/", "include/ear/", "eigen", "freestanding"],
     "smoother/": ["smoother/", "filter/", "include/ear/", "eigen", "ceres", "freestanding"],
     "frontend/": ["frontend/", "include/ear/", "eigen", "opencv", *STANDARD],
-    "src/": ["src/", "filter/", "frontend/", "include/ear/", "eigen", "opencv", "spdlog", *STANDARD],
-    "src/recording/": ["src/recording/", "include/ear/", "eigen", "opencv", "yaml-cpp", "json", "spdlog", *STANDARD],
+    "src/": ["src/", "src/log/", "filter/", "frontend/", "include/ear/", "eigen", "opencv", *STANDARD],
+    "src/log/": ["src/log/", "include/ear/", "spdlog", *STANDARD],
+    "src/recording/": ["src/recording/", "src/log/", "include/ear/", "eigen", "opencv", "yaml-cpp", "json", *STANDARD],
     "src/bag/": ["src/bag/", "src/recording/", "include/ear/", "eigen", "ros", "yaml-cpp", *STANDARD],
     "src/mavlink/": ["src/mavlink/", "filter/", "include/ear/", "eigen", "posix", *STANDARD],
     # Simulated truth shares no code with the models, and an evaluation does not know what made the estimate.

@@ -39,10 +39,11 @@ class DebianPackage(unittest.TestCase):
     def test_dependencies(self):
         """They are those of the program, with versions; none is a package for building."""
         depends = self.field("Depends")
-        for library in (r"libc6 \(>=", r"libstdc\+\+6 \(>=", r"libopencv-video\d+", r"libyaml-cpp\d"):
+        for library in (r"libc6 \(>=", r"libstdc\+\+6 \(>=", r"libopencv-video\d+", r"libyaml-cpp\d", r"libspdlog\d"):
             self.assertRegex(depends, library)
         self.assertNotIn("-dev", depends)
-        self.assertIn("libeigen3-dev", self.field("Recommends"))
+        for package in ("libeigen3-dev", "libopencv-dev", "libspdlog-dev"):
+            self.assertIn(package, self.field("Recommends"))
         names = [re.split(r"[ |]", entry.strip())[0] for entry in depends.split(",")]
         for name in names:  # a typing error would be a package that does not exist
             with self.subTest(package=name):
@@ -54,7 +55,7 @@ class DebianPackage(unittest.TestCase):
         for file in ("bin/ear", "include/ear/ear_c.h", "include/ear/odometry.h", "include/ear-filter/filter/filter.h",
                      "share/doc/ear-msckf/copyright"):
             self.assertIn(f"./usr/{file}", files)
-        for ending in ("/libear.a", "/libear_filter.a", "/libear_frontend.a", "/cmake/ear/earConfig.cmake"):
+        for ending in ("/libear.a", "/libear_filter.a", "/libear_frontend.a", "/libear_log.a", "/cmake/ear/earConfig.cmake"):
             self.assertTrue(any(file.endswith(ending) for file in files), ending)
         self.assertFalse([file for file in files if file.endswith((".cpp", ".o", ".py"))])
 

@@ -19,6 +19,29 @@ def ear(*arguments, folder=None):
     return subprocess.run(command, cwd=folder, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
 
 
+POSE = "T_BS: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]\n"
+STANDING = {  # of a sensor: period [ms], what follows the stamp, sensor.yaml
+    "imu0": (5, "0.001,0.002,0.003,0.1,0.2,9.8", POSE + "rate_hz: 200\ngyroscope_noise_density: 1e-3\n"
+             "gyroscope_random_walk: 2e-5\naccelerometer_noise_density: 1e-2\naccelerometer_random_walk: 3e-4\n"),
+    "encoder0": (10, "100,100", POSE + "rate_hz: 100\nresolution: 262144\nwraps: true\nwheel_radius: [0.075, 0.075]\n"
+                 "wheel_separation: 0.4\nnoise_counts: 2.0\n"),
+    "laser0": (20, "0.075", "rate_hz: 50\nbeams:\n  - {name: rear, origin: [0, 0, 0], direction: [0, 0, -1]}\n"
+               "range: [0.02, 4.0]\nnoise: 0.004\n"),
+}
+
+
+def write_standing(recording, *sensors):
+    """Three seconds of a vehicle that stands, without a camera."""
+    for sensor in sensors:
+        period_ms, row, calibration = STANDING[sensor]
+        folder = recording / "mav0" / sensor
+        folder.mkdir(parents=True)
+        stamps = range(0, 3_000_000_000, period_ms * 1_000_000)
+        rows = "".join(f"{stamp},{row}\n" for stamp in stamps)
+        (folder / "data.csv").write_text("#timestamp [ns],...\n" + rows, encoding="utf-8")
+        (folder / "sensor.yaml").write_text(calibration, encoding="utf-8")
+
+
 class CommandLine(unittest.TestCase):
     def assert_refused(self, result, message):
         """An exit code of its own making (a signal's is negative), and the reason on the error stream."""
@@ -57,6 +80,54 @@ class CommandLine(unittest.TestCase):
         result = ear("check", "missing")  # its findings are its output, not an error of the program
         self.assertEqual(result.returncode, 2)
         self.assertIn("missing: no such folder", result.stdout)
+
+    def test_check_and_run_refuse_the_same(self):
+        """Inertial samples and lasers alone; and settings that the estimator does not take."""
+        with tempfile.TemporaryDirectory() as folder:
+            recording, out = Path(folder) / "recording", Path(folder) / "out"
+            write_standing(recording, "imu0", "laser0")
+            reason = "neither a camera nor wheels"
+            self.assert_refused(ear("run", recording, "--out", out), reason)
+            result = ear("check", recording)
+            self.assertEqual(result.returncode, 2, result)
+            self.assertIn(reason, result.stdout)
+
+            write_standing(recording, "encoder0")
+            self.assertEqual(ear("check", recording).returncode, 0)
+            config = Path(folder) / "config.yaml"
+            config.write_text("filter:\n  window: 1\n", encoding="utf-8")
+            self.assert_refused(ear("run", recording, "--out", out, "--config", config), "filter.window")
+            result = ear("check", recording, "--config", config)
+            self.assertEqual(result.returncode, 2, result)
+            self.assertIn("filter.window", result.stdout)
+
+    def test_learned_calibration_is_in_the_summary(self):
+        with tempfile.TemporaryDirectory() as folder:
+            recording, out = Path(folder) / "recording", Path(folder) / "out"
+            write_standing(recording, "imu0", "laser0", "encoder0")
+            self.assertEqual(ear("run", recording, "--out", out).returncode, 0)
+            calibration = json.loads((out / "summary.json").read_text(encoding="utf-8"))["calibration"]
+            self.assertEqual(len(calibration["T_BO"]), 16)
+            self.assertEqual([beam["name"] for beam in calibration["beams"]], ["rear"])
+            self.assertNotIn("T_BC0", calibration)
+
+    def test_log(self):
+        with tempfile.TemporaryDirectory() as folder:
+            recording, out, log = Path(folder) / "recording", Path(folder) / "out", Path(folder) / "log.txt"
+            write_standing(recording, "imu0", "encoder0")
+            with (recording / "mav0/encoder0/data.csv").open("a", encoding="utf-8") as file:
+                file.write("torn")
+            run = ("run", recording, "--out", out)
+            quiet = ear(*run, "--log-file", log)  # after the subcommand, as its own options
+            self.assertEqual(quiet.returncode, 0, quiet)
+            self.assertRegex(quiet.stderr, r"^ear: warning: encoder0: torn last line, 1 times, first at .*data.csv:\d+")
+            self.assertNotIn("tracking", quiet.stderr)
+            self.assertRegex(log.read_text(encoding="utf-8"), r"(?m)^20\S+ \S+ info: at \S+ s: tracking$")
+            self.assertIn("info: at", ear("--log-level", "info", *run).stderr)
+            self.assertEqual(ear(*run, "--log-level", "error").stderr, "")
+            self.assert_refused(ear("--log-level", "error", "run", "missing"), "ear: error: missing")
+            self.assert_refused(ear(*run, "--log-level", "loud"), "--log-level")
+            self.assert_refused(ear(*run, "--log-file", log / "below"), "cannot be written")
 
     def test_unknown_sequence(self):
         with tempfile.TemporaryDirectory() as folder:

@@ -1,6 +1,7 @@
 #include "tools/evaluation/text_table.h"
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <charconv>
 #include <cmath>
@@ -98,31 +99,46 @@ std::optional<TimeNs> rounded(const Decimal& number, int point) {
   return (number.negative ? -1 : 1) * (value + (up ? 1 : 0));
 }
 
+/// Which of the lines above the first row names the columns: the last that is as wide as that row; where the row is
+/// torn, the last that names a time. Nothing: all are comments.
+std::vector<std::string> header_among(const std::vector<std::vector<std::string>>& lines, std::size_t columns) {
+  const auto names_time = [](const std::vector<std::string>& fields) {
+    constexpr std::array kNames{"t_ns", "timestamp", "timestamp [ns]"};
+    return std::find_first_of(fields.begin(), fields.end(), kNames.begin(), kNames.end()) != fields.end();
+  };
+  const auto fits = [columns](const std::vector<std::string>& fields) { return fields.size() == columns; };
+  auto header = std::find_if(lines.rbegin(), lines.rend(), fits);
+  if (header == lines.rend()) header = std::find_if(lines.rbegin(), lines.rend(), names_time);
+  return header == lines.rend() ? std::vector<std::string>{} : *header;
+}
+
 }  // namespace
 
 TextTable::TextTable(std::filesystem::path path) : path_(std::move(path)) {
   std::ifstream file(path_);
   if (!file || std::filesystem::is_directory(path_)) throw std::runtime_error(path_.string() + ": cannot be read");
 
+  std::vector<std::vector<std::string>> before;  // lines above the first row: comments, and a header somewhere
   std::string line;
   for (std::size_t number = 1; std::getline(file, line); ++number) {
     const std::string_view text = trimmed(line);
     if (text.empty()) continue;
     const bool commas = text.find(',') != std::string_view::npos;
     if (text.front() == '#') {
-      if (rows_.empty()) header_ = split(trimmed(text.substr(1)), commas);
+      if (rows_.empty()) before.push_back(split(trimmed(text.substr(1)), commas));
       continue;
     }
     std::vector<std::string> fields = split(text, commas);
     const bool has_numbers = std::any_of(fields.begin(), fields.end(), as_number);
     if (rows_.empty() && !has_numbers) {
-      header_ = std::move(fields);
+      before.push_back(std::move(fields));
       continue;
     }
     if (rows_.empty()) has_commas_ = commas;
     rows_.push_back({number, std::move(fields)});
   }
   if (rows_.empty()) throw std::runtime_error(path_.string() + ": holds no rows of numbers");
+  header_ = header_among(before, columns());
   check_widths();
 }
 

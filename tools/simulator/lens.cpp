@@ -9,14 +9,14 @@ namespace {
 constexpr double kNearest = 0.02;  // [m] in front of the camera
 constexpr double kWidest = 2.0;    // |x|, |y| of a ray: far outside the picture, where the polynomials mean nothing
 
-Eigen::Vector2d bend_radial_tangential(const std::array<double, 4>& k, const Eigen::Vector2d& p) {
+Eigen::Vector2d bend_radial_tangential(const std::array<double, 5>& k, const Eigen::Vector2d& p) {
   const double r2 = p.squaredNorm();
-  const double radial = 1.0 + r2 * (k[0] + r2 * k[1]);
+  const double radial = 1.0 + r2 * (k[0] + r2 * (k[1] + r2 * k[4]));
   return {p.x() * radial + 2.0 * k[2] * p.x() * p.y() + k[3] * (r2 + 2.0 * p.x() * p.x()),
           p.y() * radial + k[2] * (r2 + 2.0 * p.y() * p.y()) + 2.0 * k[3] * p.x() * p.y()};
 }
 
-Eigen::Vector2d bend_equidistant(const std::array<double, 4>& k, const Eigen::Vector2d& p) {
+Eigen::Vector2d bend_equidistant(const std::array<double, 5>& k, const Eigen::Vector2d& p) {
   const double r = p.norm();
   if (r < 1e-12) return p;
   const double angle = std::atan(r);

@@ -103,6 +103,7 @@ std::vector<std::string> picture_origin(const Simulation& simulation) {
                                  "frames: " + std::to_string(simulation.exposures().size()),
                                  "camera_rate_hz: " + std::to_string(options.camera_rate_hz)};
   lines.emplace_back(options.lens == LensModel::equidistant ? "lens: equidistant" : "lens: radial-tangential");
+  if (options.k3 != 0.0) lines.back() += ", k3 " + std::to_string(options.k3);
   return lines;
 }
 

@@ -70,8 +70,10 @@ void write_camera(const Simulation& simulation, const fs::path& folder, std::siz
   yaml.print("rate_hz: %g\nresolution: [%d, %d]\ncamera_model: pinhole\n", camera.rate_hz, camera.width, camera.height);
   yaml.print("intrinsics: [%.6f, %.6f, %.6f, %.6f]  # fu, fv, cu, cv\n", camera.fu, camera.fv, camera.cu, camera.cv);
   yaml.print("distortion_model: %s\n", camera.lens == LensModel::equidistant ? "equidistant" : "radial-tangential");
-  yaml.print("distortion_coefficients: [%.8f, %.8f, %.8f, %.8f]\n", camera.distortion[0], camera.distortion[1],
-             camera.distortion[2], camera.distortion[3]);
+  const std::array<double, 5>& k = camera.distortion;
+  yaml.print("distortion_coefficients: [%.8f, %.8f, %.8f, %.8f", k[0], k[1], k[2], k[3]);
+  if (k[4] != 0.0) yaml.print(", %.8f", k[4]);
+  yaml.print("]\n");
   yaml.print("timeshift_cam_imu: %g  # [s] add it to a stamp to get IMU time\n",
              simulation.calibration().camera_time_offset);
   yaml.close();

@@ -23,6 +23,9 @@ Options checked(const Options& options) {
   if (!(options.camera_rate_hz > 0.0)) throw std::invalid_argument("the camera rate must be positive");
   if (options.duration && !(*options.duration > 0.0)) throw std::invalid_argument("the duration must be positive");
   for (const Fault& fault : options.faults) require_valid(fault);
+  if (options.k3 != 0.0 && options.lens != LensModel::radial_tangential) {
+    throw std::invalid_argument("k3: of radial-tangential lenses only");
+  }
   return options;
 }
 
@@ -97,6 +100,12 @@ Calibration sensors_of(const Options& options, Calibration calibration) {
   return calibration;
 }
 
+Calibration vehicle_of(const Options& options) {
+  Calibration vehicle = make_vehicle(options.camera_rate_hz, options.lens);
+  for (CameraCalibration& camera : vehicle.cameras) camera.distortion[4] = options.k3;
+  return vehicle;
+}
+
 // Samples arrive when they are stamped, by a clock that does not jump.
 template <typename Sample>
 void append_deliveries(std::vector<Delivery>& deliveries, const std::vector<Sample>& samples, SensorStream stream) {
@@ -109,7 +118,7 @@ Simulation::Simulation(const Options& options) : Simulation(checked(options), va
 
 Simulation::Simulation(const Options& options, const Sequence& sequence)
     : options_(options),
-      true_calibration_(make_vehicle(options.camera_rate_hz, options.lens)),
+      true_calibration_(vehicle_of(options)),
       calibration_(told_calibration(options, true_calibration_)),
       scene_(make_scene(sequence.place, sequence.terrain)),
       plan_(planned(options, sequence, *true_calibration_.encoder)),

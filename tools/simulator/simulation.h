@@ -39,6 +39,7 @@ struct Options {
   bool tracks = true;        ///< false: no feature tracks, for recordings of images
   TrackOptions track;
   std::vector<Fault> faults = {};  ///< what else goes wrong; all that they do not hit stays, sample for sample
+  double k3 = 0.0;                 ///< of both lenses, which must be radial-tangential then
 };
 
 /// The truth at one instant. World W: z up, the origin in a corner of the room.
