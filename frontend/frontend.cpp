@@ -11,7 +11,6 @@
 #include "frontend/detector.h"
 #include "frontend/flow_check.h"
 #include "frontend/image_pyramid.h"
-#include "frontend/image_quality.h"
 #include "frontend/lens.h"
 #include "frontend/reference_patch.h"
 #include "frontend/stereo_matcher.h"
@@ -83,7 +82,6 @@ class Frontend::Impl {
     use_right_ = use_right;
   }
 
-  ImageQuality quality;
   FrontendTiming timing;
 
  private:
@@ -151,21 +149,17 @@ const FeatureFrame& Frontend::Impl::process(const StereoFrame& frame, const Moti
 
   if (left_.shows(frame.left)) {  // no two exposures are equal: it tells nothing, and the filter will see that
     timing = {};
-    quality.tracked = static_cast<int>(tracks_.size());
-    quality.detected = 0;
     output_.t_ns = frame.t_ns;
     return output_;
   }
   Stopwatch watch;
   left_.build(frame.left);
   if (right_present_) right_.build(frame.right);
-  quality = measure_quality(left_.level(0));
   timing.pyramid = watch.lap();
   track(prediction);
   timing.track = watch.lap();
   reject();
   timing.reject = watch.lap();
-  quality.tracked = static_cast<int>(tracks_.size());
   match_stereo();
   timing.stereo = watch.lap();
   refresh_patches();
@@ -312,7 +306,6 @@ void Frontend::Impl::refresh_patches() {
 void Frontend::Impl::detect() {
   const int wanted = static_cast<int>(max_features_) - static_cast<int>(tracks_.size());
   const std::vector<Corner> corners = detector_.detect(left_, pixels(), wanted);
-  quality.detected = 0;
   for (const Corner& corner : corners) {
     const auto ray = lens_.to_normalized(corner.pixel.cast<double>());
     if (!ray) continue;
@@ -325,7 +318,6 @@ void Frontend::Impl::detect() {
     track.left_ray = *ray;
     if (right_present_) match_stereo(track, false);
     tracks_.push_back(track);
-    ++quality.detected;
   }
 }
 
@@ -354,12 +346,9 @@ std::vector<Eigen::Vector2f> Frontend::Impl::pixels() const {
 void Frontend::Impl::write_output(TimeNs t_ns) {
   output_.t_ns = t_ns;
   output_.features.clear();
-  quality.stereo = 0;
   for (const Track& track : tracks_) {
     output_.features.push_back({track.id, track.left_ray, track.right_ray, track.has_right});
-    quality.stereo += track.has_right ? 1 : 0;
   }
-  quality.coverage = detector_.coverage(pixels());
 }
 
 Frontend::Frontend(const FrontendConfig& config, std::vector<CameraCalibration> cameras)
@@ -371,7 +360,6 @@ Frontend& Frontend::operator=(Frontend&&) noexcept = default;
 const FeatureFrame& Frontend::process(const StereoFrame& frame, const MotionPrediction& prediction) {
   return impl_->process(frame, prediction);
 }
-const ImageQuality& Frontend::quality() const { return impl_->quality; }
 const FrontendTiming& Frontend::timing() const { return impl_->timing; }
 void Frontend::set_limits(int max_features, bool use_right) { impl_->set_limits(max_features, use_right); }
 void Frontend::reset() { impl_->reset(); }
