@@ -136,6 +136,7 @@ Frontend::Impl::Impl(const FrontendConfig& config, std::vector<CameraCalibration
 
 void Frontend::Impl::reset() {
   tracks_.clear();
+  left_.clear();
   free_patches_.clear();
   for (std::size_t i = 0; i < patches_.size(); ++i) free_patches_.push_back(i);
 }
@@ -147,7 +148,8 @@ const FeatureFrame& Frontend::Impl::process(const StereoFrame& frame, const Moti
   output_.right_skipped = right_present_ && !use_right_;
   right_present_ = right_present_ && use_right_;
 
-  if (left_.shows(frame.left)) {  // no two exposures are equal: it tells nothing, and the filter will see that
+  output_.repeated = left_.shows(frame.left);  // no two exposures are equal
+  if (output_.repeated) {
     timing = {};
     output_.t_ns = frame.t_ns;
     return output_;

@@ -36,7 +36,8 @@ class Frontend {
   Frontend& operator=(Frontend&&) noexcept;
 
   /// Tracks the last frame's features into this one, associates them across the stereo pair, fills up with new ones.
-  /// An image that repeats the last gives its features again, as they were. The result is valid until the next call. A
+  /// A left image that is byte for byte the one before gives its features again, as they were, marked as
+  /// FeatureFrame::repeated. The result is valid until the next call. A
   /// frame whose images do not fit the calibration throws std::invalid_argument.
   const FeatureFrame& process(const StereoFrame& frame, const MotionPrediction& prediction);
 

@@ -267,27 +267,53 @@ TEST_CASE("front end: black, white and returning images") {
   for (const auto& feature : back.features) CHECK(first.count(feature.id) == 0);
 }
 
-TEST_CASE("front end: an image that repeats the last gives its features again, whatever is predicted") {
+TEST_CASE("front end: an image that repeats the last gives its features again, whatever is predicted, and says so") {
   const auto cameras = test_stereo_pair();
   Frontend frontend({kFeatures, 0.3}, cameras);
   const cv::Mat left = Camera(cameras[0]).render(at({0, 0, 0}), {wall(2.0, 30)});
   const cv::Mat right = Camera(cameras[1]).render(at({0, 0, 0}), {wall(2.0, 30)});
   const FeatureFrame first = frontend.process({0, view_of(left), view_of(right)}, {});
   REQUIRE(first.features.size() > kFeatures / 2);
+  CHECK_FALSE(first.repeated);
   const MotionPrediction moved = exact_motion(at({0, 0, 0}), at({0.1, 0.0, 0.0}));
-  const FeatureFrame& again = frontend.process({1, view_of(left), view_of(right)}, moved);
+  // In memory of its own, with rows that lie further apart and other bytes between them.
+  cv::Mat wide(left.rows, left.cols + 37, CV_8U, cv::Scalar(99));
+  left.copyTo(wide(cv::Rect(0, 0, left.cols, left.rows)));
+  ImageView copy = view_of(left);
+  copy.data = wide.data;
+  copy.stride = static_cast<std::ptrdiff_t>(wide.step);
+  const FeatureFrame again = frontend.process({1, copy, view_of(right)}, moved);
   CHECK(again.t_ns == 1);
+  CHECK(again.repeated);
   REQUIRE(again.features.size() == first.features.size());
   for (std::size_t i = 0; i < first.features.size(); ++i) {
     CHECK(again.features[i].id == first.features[i].id);
     CHECK(again.features[i].left == first.features[i].left);
     CHECK(again.features[i].right == first.features[i].right);
   }
-  cv::Mat other = left.clone();
-  other.at<std::uint8_t>(0, 0) ^= 1U;
   CHECK(frontend.timing().pyramid == 0.0);
-  frontend.process({2, view_of(other), view_of(right)}, {});
-  CHECK(frontend.timing().pyramid > 0.0);
+
+  // One grey value at a corner of the image is enough to be another one; the same again is a repetition of that.
+  TimeNs t = 2;
+  for (const cv::Point pixel : {cv::Point(0, 0), cv::Point(left.cols - 1, left.rows - 1)}) {
+    cv::Mat other = left.clone();
+    other.at<std::uint8_t>(pixel) ^= 1U;
+    CHECK_FALSE(frontend.process({t++, view_of(other), view_of(right)}, {}).repeated);
+    CHECK(frontend.timing().pyramid > 0.0);
+    CHECK(frontend.process({t++, view_of(other), view_of(right)}, {}).repeated);
+  }
+  CHECK_FALSE(frontend.process({t++, view_of(left), view_of(right)}, {}).repeated);
+  CHECK(frontend.process({t++, view_of(left), view_of(left)}, {}).repeated);          // the right image alone
+  CHECK_FALSE(frontend.process({t++, view_of(right), view_of(right)}, {}).repeated);  // the left one alone
+  std::uint64_t last_id = 0;
+  for (const FeatureObservation& feature : frontend.process({t++, view_of(right), view_of(right)}, {}).features) {
+    last_id = std::max(last_id, feature.id);
+  }
+  frontend.reset();
+  const FeatureFrame fresh = frontend.process({t, view_of(right), view_of(right)}, {});
+  CHECK_FALSE(fresh.repeated);  // there is none before it
+  CHECK(fresh.features.size() > kFeatures / 2);
+  for (const FeatureObservation& feature : fresh.features) CHECK(feature.id > last_id);
 }
 
 TEST_CASE("front end: ids are unique in a frame and never come back, also after reset") {
