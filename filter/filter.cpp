@@ -199,7 +199,7 @@ std::optional<RelativeMotion> Filter::motion_to(TimeNs t_ns) const {
     motion.R_B1B0 = R_B0B1.transpose();
     return motion;
   }
-  return motion_between(image_T_WB_, predict_here(imu_time(t_ns)));
+  return motion_between(image_pose(), predict_here(imu_time(t_ns)));
 }
 
 std::optional<Estimate> Filter::process(const FeatureFrame& given) {
@@ -229,13 +229,7 @@ std::optional<Estimate> Filter::process(const FeatureFrame& given) {
     watch_biases(seconds_between(watched_ns_, state_.imu.t_ns));
   }
   watched_ns_ = state_.imu.t_ns;
-  if (usable) {
-    any_image_ = true;
-    last_image_ns_ = frame.t_ns;
-    last_features_ = frame;
-    image_T_WB_ = {state_.imu.R_WB, state_.imu.p_WB};
-    image_rate_B_ = rate_B_;
-  }
+  if (usable) note_image(frame);
   return finish_frame(true, agreement);
 }
 

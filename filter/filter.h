@@ -182,6 +182,8 @@ class Filter final : public Estimator {
 
   // filter_images.cpp
   [[nodiscard]] bool repeats_last_image(const FeatureFrame& frame) const;
+  void note_image(const FeatureFrame& frame);
+  [[nodiscard]] Pose image_pose() const;
   [[nodiscard]] Pose motion_since_image() const;
   void bridge(const FeatureFrame& frame);
   [[nodiscard]] double noise_of(const FeatureFrame& frame);
@@ -243,7 +245,9 @@ class Filter final : public Estimator {
   bool right_skipped_ = false;  ///< in the frame at hand
   TimeNs last_frame_ns_ = 0;    ///< camera stamp of the last frame processed
   bool any_frame_ = false;
-  Pose image_T_WB_;                                         ///< body at the last image
+  Pose image_T_WB_;                                         ///< body at the last image, as it was estimated then
+  std::optional<std::uint64_t> image_clone_;                ///< the newest clone then
+  Pose image_in_clone_;                                     ///< body at the last image, in that clone
   Eigen::Vector3d image_rate_B_ = Eigen::Vector3d::Zero();  ///< its rate then [rad/s]
   TimeNs last_image_ns_ = 0;                                ///< its camera stamp
   FeatureFrame last_features_;                              ///< its features

@@ -37,10 +37,36 @@ bool Filter::repeats_last_image(const FeatureFrame& frame) const {
   return common >= kFewestRepeated && equal == common;
 }
 
+/// What the next image is compared with.
+void Filter::note_image(const FeatureFrame& frame) {
+  any_image_ = true;
+  last_image_ns_ = frame.t_ns;
+  last_features_ = frame;
+  image_rate_B_ = rate_B_;
+  image_T_WB_ = {state_.imu.R_WB, state_.imu.p_WB};
+  image_clone_.reset();
+  if (state_.clones.empty()) return;
+  const Clone& clone = state_.clones.back();
+  image_clone_ = clone.frame;
+  image_in_clone_ = {clone.T_WB.R.transpose() * image_T_WB_.R,
+                     clone.T_WB.R.transpose() * (image_T_WB_.p - clone.T_WB.p)};
+}
+
+/// Where the body was at the last image, by all that was measured since: what wheels and lasers measure on the way to
+/// the next image corrects clone and state alike, and is no motion.
+Pose Filter::image_pose() const {
+  if (!image_clone_ || status_ != Status::tracking) return image_T_WB_;
+  const auto at = static_cast<std::size_t>(clone_index(*image_clone_));
+  if (at >= state_.clones.size() || state_.clones[at].frame != *image_clone_)
+    return image_T_WB_;  // it was marginalised
+  const Pose& T_WB = state_.clones[at].T_WB;
+  return {T_WB.R * image_in_clone_.R, T_WB.R * image_in_clone_.p + T_WB.p};
+}
+
 /// The body now, in the body at the last image.
 Pose Filter::motion_since_image() const {
-  const Eigen::Matrix3d R_BW = image_T_WB_.R.transpose();
-  return {R_BW * state_.imu.R_WB, R_BW * (state_.imu.p_WB - image_T_WB_.p)};
+  const Pose T_WB0 = image_pose();
+  return {T_WB0.R.transpose() * state_.imu.R_WB, T_WB0.R.transpose() * (state_.imu.p_WB - T_WB0.p)};
 }
 
 /// Where the inertial samples since the last image may be wrong by more than noise (clipped, missing, stamps that
