@@ -297,11 +297,16 @@ Status Filter::status() const { return status_ == Status::tracking && monitor_.l
 
 std::optional<Estimate> Filter::process_without_image(TimeNs t_ns) {
   if (!covers(t_ns) || !is_next(t_ns)) return std::nullopt;
-  if (status_ == Status::tracking && !calibration_.cameras.empty() && !on_ground()) return std::nullopt;
+  if (!calibration_.cameras.empty() && !on_ground()) return std::nullopt;
   FeatureFrame nothing;
   nothing.t_ns = t_ns;
   const bool still = begin_frame(nothing, false);
-  if (status_ == Status::tracking) go_on_blind(still);
+  if (status_ == Status::tracking) {
+    go_on_blind(still);
+    if (calibration_.cameras.empty()) learn_calibration_ = !statistics_.standing;
+    watch_biases(seconds_between(watched_ns_, state_.imu.t_ns));
+  }
+  watched_ns_ = state_.imu.t_ns;
   return finish_frame(false, FrameAgreement{});
 }
 

@@ -177,7 +177,7 @@ void HealthMonitor::add_refused_frame(TimeNs imu_ns) {
 
 /// Sensors that say nothing are as little to be trusted as those that lie.
 void HealthMonitor::note_silence(TimeNs t_ns) {
-  if (!last_frame_ns_ || images_come(t_ns)) return;
+  if (!any_frame_ || images_come(t_ns)) return;
   for (std::size_t camera = 0; camera < cameras_; ++camera) trust_[camera].add(true, t_ns);
   carrying_.add(true, t_ns);
   for (const Source source : {Source::gyroscope, Source::accelerometer}) trust(source).add(false, t_ns);
@@ -186,7 +186,14 @@ void HealthMonitor::note_silence(TimeNs t_ns) {
 
 void HealthMonitor::add_frame(const Frame& frame, const std::array<SourceRecord, kSourceCount>& records) {
   const TimeNs t_ns = frame.t_ns;
+  any_frame_ = true;
+  const Frame before = last_;
   last_ = frame;
+  if (!frame.image && images_come(t_ns)) {  // between two images: what the last one showed holds
+    last_.statistics.tracks = before.statistics.tracks;
+    last_.statistics.stereo = before.statistics.stereo;
+    last_.agreement = before.agreement;
+  }
   last_refused_imu_ns_.reset();
   if (frame.image) {
     if (last_frame_ns_) {
@@ -210,7 +217,7 @@ void HealthMonitor::add_frame(const Frame& frame, const std::array<SourceRecord,
   health_.horizontal_sigma = frame.horizontal_sigma;
   health_.vertical_sigma = frame.vertical_sigma;
   decide(t_ns);
-  health_.quality = quality(frame);
+  health_.quality = quality(last_);
 }
 
 bool HealthMonitor::check_image(const FrameAgreement& agreement, TimeNs t_ns, TimeNs newest_imu_ns) {

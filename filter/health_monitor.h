@@ -119,6 +119,7 @@ class HealthMonitor {
   Trust carrying_;  ///< do the images carry the estimate? They may, where some of what they show is wrong
   Health health_;
   Frame last_;
+  bool any_frame_ = false;  ///< with an image or without
 
   std::optional<ImuSample> last_imu_;
   std::optional<TimeNs> last_frame_ns_;
