@@ -76,20 +76,20 @@ class Odometry::Impl {
       return std::nullopt;
     }
     note_frame(frame.t_ns);
-    std::optional<Estimate> estimate = update(*features);
+    std::optional<Estimate> estimate = timed([&] { return estimator_->process(*features); });
     load_.add(clock_() - start);
     return estimate;
   }
 
   std::optional<Estimate> step(TimeNs t_ns) {
     stage_times_ = StageTimes{};
-    FeatureFrame nothing;
     if (!is_time(t_ns)) {
       ++steps_.implausible;
       return std::nullopt;
     }
-    nothing.t_ns = estimator_->camera_time(t_ns);
-    return accepts(nothing.t_ns, steps_) ? update(nothing) : std::nullopt;
+    const TimeNs stamp_ns = estimator_->camera_time(t_ns);
+    if (!accepts(stamp_ns, steps_)) return std::nullopt;
+    return timed([&] { return estimator_->process_without_image(stamp_ns); });
   }
 
   [[nodiscard]] const Estimator& estimator() const { return *estimator_; }
@@ -171,9 +171,11 @@ class Odometry::Impl {
     ++camera_.accepted;
   }
 
-  std::optional<Estimate> update(const FeatureFrame& features) {
+  /// What the estimator's work comes to, and how long it takes.
+  template <typename Work>
+  std::optional<Estimate> timed(const Work& work) {
     const auto start = std::chrono::steady_clock::now();
-    std::optional<Estimate> estimate = estimator_->process(features);
+    std::optional<Estimate> estimate = work();
     stage_times_.filter = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     if (estimate) estimate->health.load_step = load_.step();
     return estimate;
