@@ -65,7 +65,7 @@ class Odometry::Impl {
       if (is_time(frame.t_ns) && estimator_->is_next(frame.t_ns)) estimator_->refuse_frame();
       return std::nullopt;
     }
-    if (!takes_turn()) {
+    if (!takes_turn(frame.t_ns)) {
       note_frame(frame.t_ns);
       return std::nullopt;
     }
@@ -77,7 +77,7 @@ class Odometry::Impl {
     }
     note_frame(frame.t_ns);
     std::optional<Estimate> estimate = timed([&] { return estimator_->process(*features); });
-    load_.add(clock_() - start);
+    load_.add(clock_() - start, frame.t_ns);
     return estimate;
   }
 
@@ -151,10 +151,10 @@ class Odometry::Impl {
   }
 
   /// Whether this frame is used at all, and how much of it: as the budget allows.
-  bool takes_turn() {
+  bool takes_turn(TimeNs t_ns) {
     const LoadLimits limits = load_.limits();
     if (++frames_left_out_ < limits.frame_every) {
-      load_.add(0.0);
+      load_.add(0.0, t_ns);
       return false;
     }
     frames_left_out_ = 0;
