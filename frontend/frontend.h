@@ -25,7 +25,7 @@ struct FrontendTiming {
   double pyramid = 0.0, track = 0.0, detect = 0.0, stereo = 0.0, reject = 0.0;
 };
 
-/// Runs on the calling thread. Library calls may use OpenCV's threads unless the program says cv::setNumThreads(1);
+/// Runs on the calling thread. Library calls may use OpenCV's threads unless the program calls cv::setNumThreads(1);
 /// the result is the same bit for bit.
 class Frontend {
  public:

@@ -101,7 +101,7 @@ class QueuedOdometry {
   [[nodiscard]] StereoFrame view_of(const Frame& frame) const;
   void drop_old_frames();
   void hand_over(TimeNs until_ns);
-  void tell_state();
+  void set_live_state();
 
   Odometry odometry_;
   bool drops_frames_;
