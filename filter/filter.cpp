@@ -14,14 +14,6 @@ namespace {
 constexpr double kLongestPredict = 0.5;  // [s] chosen: beyond the newest sample
 constexpr double kJumpNoticed = 0.3;     // [s] chosen: until a bias that jumped is found out
 
-/// A bias that jumped is as little known as at the start, and took the motion along until it was found out.
-void inflate(const BiasJump& jumped, const PriorConfig& prior, Ekf& ekf) {
-  const double gyro = jumped.gyro ? prior.gyro_bias : 0.0;
-  const double accel = jumped.accel ? prior.accel_bias : 0.0;
-  ekf.inflate_motion(gyro * kJumpNoticed, accel * kJumpNoticed, 0.5 * accel * kJumpNoticed * kJumpNoticed);
-  ekf.inflate_biases(gyro, accel);
-}
-
 }  // namespace
 
 Filter::Filter(const FilterConfig& config, const Calibration& calibration)
@@ -59,9 +51,7 @@ std::optional<Estimate> Filter::process(const FeatureFrame& given) {
     } else {
       sources_.go_without_image(advice, ekf_, records_);
     }
-    const BiasJump jumped = bias_watch_.judge(ekf_.take_bias_changes(), ekf_.state().imu.t_ns);
-    if (jumped.any()) inflate(jumped, config_.prior, ekf_);
-    health_.report_imu_fault(jumped.gyro, jumped.accel, ekf_.state().imu.t_ns);
+    watch_biases();
   }
   if (use_image) sources_.cameras().remember(frame, ekf_);
   return report(true, seen);
@@ -69,10 +59,11 @@ std::optional<Estimate> Filter::process(const FeatureFrame& given) {
 
 std::optional<Estimate> Filter::process_without_image(TimeNs t_ns) {
   if (check_stamp(t_ns) != FrameStamp::usable) return std::nullopt;
-  if (ekf_.running() && sources_.cameras().count() > 0 && !sources_.on_ground()) return std::nullopt;
+  if (sources_.cameras().count() > 0 && !sources_.on_ground()) return std::nullopt;
   propagate_to(FeatureFrame{t_ns, {}});
   if (ekf_.running()) {
     sources_.go_without_image(advise(consistency_, health_.health(), config_.anomaly), ekf_, records_);
+    watch_biases();
   }
   return report(false, FrameAgreement{});
 }
@@ -90,6 +81,18 @@ void Filter::propagate_to(const FeatureFrame& frame) {
   consistency_ = consistency_check_(sources_.displacements(frame, t_ns, ingest_, ekf_));
   sources_.advance(t_ns, advise(consistency_, health_.health(), config_.anomaly), ingest_, ekf_, records_);
   start_again(frame);
+}
+
+/// A bias that jumped is as little known as at the start, and took the motion along until it was found out.
+void Filter::watch_biases() {
+  const TimeNs t_ns = ekf_.state().imu.t_ns;
+  const BiasJump jumped = bias_watch_.judge(ekf_.take_bias_changes(), t_ns);
+  if (!jumped.any()) return;
+  const double gyro = jumped.gyro ? config_.prior.gyro_bias : 0.0;
+  const double accel = jumped.accel ? config_.prior.accel_bias : 0.0;
+  ekf_.inflate_motion(gyro * kJumpNoticed, accel * kJumpNoticed, 0.5 * accel * kJumpNoticed * kJumpNoticed);
+  ekf_.inflate_biases(gyro, accel);
+  health_.report_imu_fault(jumped.gyro, jumped.accel, t_ns);
 }
 
 /// What is given away of the state, and whether it is.
@@ -258,7 +261,8 @@ std::optional<RelativeMotion> Filter::motion_to(TimeNs t_ns) const {
   const CameraState& camera = ekf_.state().camera;
   const TimeNs to_ns = imu_time(t_ns, camera);
   if (ekf_.running()) {
-    return motion_between(last->T_WB, nav_state(integrate_to(to_ns, ekf_.state().imu, ingest_.imu())));
+    return motion_between(sources_.cameras().image_pose(ekf_.state()),
+                          nav_state(integrate_to(to_ns, ekf_.state().imu, ingest_.imu())));
   }
   RelativeMotion motion;
   if (const std::optional<Eigen::Vector3d> path = start_.path_to(to_ns)) {

@@ -76,6 +76,7 @@ class Filter final : public Estimator {
 
  private:
   void propagate_to(const FeatureFrame& frame);
+  void watch_biases();
   void start(const FeatureFrame& frame, TimeNs t_ns);
   void start_again(const FeatureFrame& frame);
   void stop();

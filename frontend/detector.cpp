@@ -70,12 +70,6 @@ std::vector<int> Detector::count_per_cell(const std::vector<Eigen::Vector2f>& pi
   return count;
 }
 
-double Detector::coverage(const std::vector<Eigen::Vector2f>& pixels) const {
-  const std::vector<int> count = count_per_cell(pixels);
-  const auto held = std::count_if(count.begin(), count.end(), [](int n) { return n > 0; });
-  return static_cast<double>(held) / static_cast<double>(count.size());
-}
-
 // Where corners of a cell may lie: the cell, less the image's margin.
 cv::Rect Detector::area_of(std::size_t cell) const {
   const int column = static_cast<int>(cell) % columns_;

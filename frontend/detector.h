@@ -26,9 +26,6 @@ class Detector {
   [[nodiscard]] std::vector<Corner> detect(const ImagePyramid& pyramid, const std::vector<Eigen::Vector2f>& taken,
                                            int wanted);
 
-  /// Share of cells that hold one of the pixels, 0 to 1.
-  [[nodiscard]] double coverage(const std::vector<Eigen::Vector2f>& pixels) const;
-
  private:
   [[nodiscard]] std::vector<int> count_per_cell(const std::vector<Eigen::Vector2f>& pixels) const;
   [[nodiscard]] cv::Rect area_of(std::size_t cell) const;

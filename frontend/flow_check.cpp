@@ -12,7 +12,7 @@
 namespace ear {
 namespace {
 
-constexpr std::size_t kMinFlows = 8;   // fewer say nothing about a common motion
+constexpr std::size_t kMinFlows = 8;   // fewer show no common motion
 constexpr std::size_t kMinDepths = 8;  // to measure the translation with its length
 constexpr int kMaxTrials = 60;
 constexpr double kConfidence = 0.999;

@@ -28,7 +28,7 @@ struct MotionGuess {
   bool translation_known = false;
 };
 
-/// What the flows say about the camera's motion.
+/// The camera's motion as the flows show it.
 struct Consensus {
   std::vector<std::uint8_t> inliers;  ///< one flag for each flow: 1 if it belongs to the static scene
   Transfer motion;                    ///< first frame to second
@@ -40,7 +40,7 @@ class FlowCheck {
   /// `tolerance`: distance in normalized coordinates at which a feature stops being static.
   explicit FlowCheck(double tolerance) : tolerance_(tolerance) {}
 
-  /// With too few flows to tell, the motion is the guess; all are inliers if its rotation is known, else none is.
+  /// With too few flows to measure it, the motion is the guess; all are inliers if its rotation is known, else none is.
   [[nodiscard]] Consensus find(const std::vector<Flow>& flows, const MotionGuess& guess);
 
  private:

@@ -11,7 +11,6 @@
 #include "frontend/detector.h"
 #include "frontend/flow_check.h"
 #include "frontend/image_pyramid.h"
-#include "frontend/image_quality.h"
 #include "frontend/lens.h"
 #include "frontend/reference_patch.h"
 #include "frontend/stereo_matcher.h"
@@ -83,7 +82,6 @@ class Frontend::Impl {
     use_right_ = use_right;
   }
 
-  ImageQuality quality;
   FrontendTiming timing;
 
  private:
@@ -138,6 +136,7 @@ Frontend::Impl::Impl(const FrontendConfig& config, std::vector<CameraCalibration
 
 void Frontend::Impl::reset() {
   tracks_.clear();
+  left_.clear();
   free_patches_.clear();
   for (std::size_t i = 0; i < patches_.size(); ++i) free_patches_.push_back(i);
 }
@@ -149,23 +148,20 @@ const FeatureFrame& Frontend::Impl::process(const StereoFrame& frame, const Moti
   output_.right_skipped = right_present_ && !use_right_;
   right_present_ = right_present_ && use_right_;
 
-  if (left_.shows(frame.left)) {  // no two exposures are equal: it tells nothing, and the filter will see that
+  output_.repeated = left_.shows(frame.left);  // no two exposures are equal
+  if (output_.repeated) {
     timing = {};
-    quality.tracked = static_cast<int>(tracks_.size());
-    quality.detected = 0;
     output_.t_ns = frame.t_ns;
     return output_;
   }
   Stopwatch watch;
   left_.build(frame.left);
   if (right_present_) right_.build(frame.right);
-  quality = measure_quality(left_.level(0));
   timing.pyramid = watch.lap();
   track(prediction);
   timing.track = watch.lap();
   reject();
   timing.reject = watch.lap();
-  quality.tracked = static_cast<int>(tracks_.size());
   match_stereo();
   timing.stereo = watch.lap();
   refresh_patches();
@@ -312,7 +308,6 @@ void Frontend::Impl::refresh_patches() {
 void Frontend::Impl::detect() {
   const int wanted = static_cast<int>(max_features_) - static_cast<int>(tracks_.size());
   const std::vector<Corner> corners = detector_.detect(left_, pixels(), wanted);
-  quality.detected = 0;
   for (const Corner& corner : corners) {
     const auto ray = lens_.to_normalized(corner.pixel.cast<double>());
     if (!ray) continue;
@@ -325,7 +320,6 @@ void Frontend::Impl::detect() {
     track.left_ray = *ray;
     if (right_present_) match_stereo(track, false);
     tracks_.push_back(track);
-    ++quality.detected;
   }
 }
 
@@ -354,12 +348,9 @@ std::vector<Eigen::Vector2f> Frontend::Impl::pixels() const {
 void Frontend::Impl::write_output(TimeNs t_ns) {
   output_.t_ns = t_ns;
   output_.features.clear();
-  quality.stereo = 0;
   for (const Track& track : tracks_) {
     output_.features.push_back({track.id, track.left_ray, track.right_ray, track.has_right});
-    quality.stereo += track.has_right ? 1 : 0;
   }
-  quality.coverage = detector_.coverage(pixels());
 }
 
 Frontend::Frontend(const FrontendConfig& config, std::vector<CameraCalibration> cameras)
@@ -371,7 +362,6 @@ Frontend& Frontend::operator=(Frontend&&) noexcept = default;
 const FeatureFrame& Frontend::process(const StereoFrame& frame, const MotionPrediction& prediction) {
   return impl_->process(frame, prediction);
 }
-const ImageQuality& Frontend::quality() const { return impl_->quality; }
 const FrontendTiming& Frontend::timing() const { return impl_->timing; }
 void Frontend::set_limits(int max_features, bool use_right) { impl_->set_limits(max_features, use_right); }
 void Frontend::reset() { impl_->reset(); }

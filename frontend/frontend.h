@@ -20,23 +20,13 @@ struct MotionPrediction {
   bool translation_known = false;
 };
 
-/// What the images of one frame are worth.
-struct ImageQuality {
-  double brightness = 0.0;  ///< mean grey value, 0 to 255
-  double sharpness = 0.0;   ///< a measure of blur: larger is sharper
-  int tracked = 0;          ///< features that were seen in the last frame as well
-  int detected = 0;         ///< features new in this frame
-  int stereo = 0;           ///< features seen by both cameras
-  double coverage = 0.0;    ///< share of the image's grid cells that hold a feature, 0 to 1
-};
-
 /// Wall-clock time spent in each step of the last frame [s]. `detect` includes the first stereo search of new features.
 struct FrontendTiming {
   double pyramid = 0.0, track = 0.0, detect = 0.0, stereo = 0.0, reject = 0.0;
 };
 
-/// Runs on the calling thread. Library calls may use OpenCV's threads unless the program says cv::setNumThreads(1); the
-/// result is the same bit for bit.
+/// Runs on the calling thread. Library calls may use OpenCV's threads unless the program calls cv::setNumThreads(1);
+/// the result is the same bit for bit.
 class Frontend {
  public:
   /// Throws std::invalid_argument if there is no camera or a calibration is unusable.
@@ -46,11 +36,11 @@ class Frontend {
   Frontend& operator=(Frontend&&) noexcept;
 
   /// Tracks the last frame's features into this one, associates them across the stereo pair, fills up with new ones.
-  /// An image that repeats the last gives its features again, as they were. The result is valid until the next call. A
+  /// A left image that is byte for byte the one before gives its features again, as they were, marked as
+  /// FeatureFrame::repeated. The result is valid until the next call. A
   /// frame whose images do not fit the calibration throws std::invalid_argument.
   const FeatureFrame& process(const StereoFrame& frame, const MotionPrediction& prediction);
 
-  [[nodiscard]] const ImageQuality& quality() const;
   [[nodiscard]] const FrontendTiming& timing() const;
 
   /// From the next frame on: so many tracks at a time, up to FrontendConfig::max_features, and whether the right image

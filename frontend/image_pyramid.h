@@ -28,8 +28,11 @@ class ImagePyramid {
   /// Copies the image and builds all levels. Memory is kept from one image to the next.
   void build(const ImageView& image);
 
-  /// Was it built from this very image, pixel for pixel?
+  /// Was it built from this very image, byte for byte? What lies between the rows of either does not count.
   [[nodiscard]] bool shows(const ImageView& image) const;
+
+  /// As before the first image.
+  void clear() { levels_.clear(); }
 
   [[nodiscard]] int top_level() const { return static_cast<int>(levels_.size()) - 1; }
 

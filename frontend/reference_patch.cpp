@@ -28,7 +28,7 @@ bool plausible(const Eigen::Matrix2f& affine) {
 }
 
 // Steps until one is shorter than `short_enough`, and returns the last. Where the image is sharper than the patch,
-// steps overshoot: each then undoes a part of the one before, which tells how much shorter they should be.
+// steps overshoot: each then undoes a part of the one before, which shows how much shorter they should be.
 template <class DoStep>
 std::optional<PatchLevel::Step> settle(int max_steps, float short_enough, DoStep&& do_step) {
   float scale = 1.0F;

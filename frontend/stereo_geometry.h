@@ -1,4 +1,4 @@
-// What two calibrated cameras say about one point: transfer across the pair, inverse depth, distance to the epipolar
+// What two calibrated cameras measure of one point: transfer across the pair, inverse depth, distance to the epipolar
 // line.
 #pragma once
 
@@ -25,7 +25,7 @@ struct StereoPoint {
   double epipolar_distance = 0.0;  ///< distance of the right ray from the epipolar line, normalized coordinates
 };
 
-/// The inverse depth that brings `x0` closest to `x1`; nothing if the pair of rays says nothing about depth.
+/// The inverse depth that brings `x0` closest to `x1`; nothing if the pair of rays shows no depth.
 [[nodiscard]] inline std::optional<StereoPoint> intersect(const Transfer& stereo, const Eigen::Vector2d& x0,
                                                           const Eigen::Vector2d& x1) {
   // (R x0 + rho p).xy - x1 (R x0 + rho p).z = 0 is linear in rho: two equations, one unknown.

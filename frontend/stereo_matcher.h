@@ -24,7 +24,7 @@ class StereoMatcher {
   /// `nearest_depth` [m]: closer points are not searched for.
   StereoMatcher(const CameraCalibration& left, const CameraCalibration& right, double nearest_depth);
 
-  /// Follows a match known from before: starts where `surface` says. Nothing if the patch is not there, off the
+  /// Follows a match known from before: starts where `surface` predicts it. Nothing if the patch is not there, off the
   /// epipolar line, or at a very different depth.
   [[nodiscard]] std::optional<StereoMatch> follow(const ImagePyramid& right, const ReferencePatch& patch,
                                                   const Warp& left_warp, const Eigen::Vector2d& left,

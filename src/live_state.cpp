@@ -7,10 +7,10 @@ namespace ear {
 
 void LiveState::add(const ImuSample& sample) {
   if (is_time(sample.t_ns) && sample.gyro_B.allFinite() && sample.accel_B.allFinite()) take(sample);
-  if (const Told* const told = told_.take()) begin(*told);
+  if (const Given* const given = latest_.take()) begin(*given);
 }
 
-/// Where the stamps jump, the estimator has to tell what that means.
+/// Where the stamps jump, the estimator decides what that means.
 void LiveState::take(const ImuSample& sample) {
   if (!samples_.empty()) {
     const double dt = seconds_between(samples_.back().t_ns, sample.t_ns);
@@ -26,16 +26,16 @@ void LiveState::take(const ImuSample& sample) {
   samples_.push(sample);
 }
 
-/// From the state that was told through all samples after it. One that is older than all samples is of no use.
-void LiveState::begin(const Told& told) {
-  if (!told.state) {
+/// From the state that was set through all samples after it. One that is older than all samples is of no use.
+void LiveState::begin(const Given& given) {
+  if (!given.state) {
     state_.reset();
     return;
   }
   std::size_t next = samples_.size();
-  while (next > 0 && samples_[next - 1].t_ns > told.sample_ns) --next;
+  while (next > 0 && samples_[next - 1].t_ns > given.sample_ns) --next;
   if (next == 0) return;
-  const NavState& from = *told.state;
+  const NavState& from = *given.state;
   state_ = ImuState{from.t_ns, from.q_WB.toRotationMatrix(), from.v_W, from.p_WB, from.b_g, from.b_a};
   age_ = 0.0;
   for (; next < samples_.size(); ++next) carry_on(samples_[next - 1], samples_[next]);

@@ -122,7 +122,7 @@ class Odometry::Impl {
       }
       return std::nullopt;
     }
-    if (!takes_turn()) {
+    if (!takes_turn(frame.t_ns)) {
       note_frame(frame.t_ns);
       return std::nullopt;
     }
@@ -133,20 +133,20 @@ class Odometry::Impl {
       return std::nullopt;
     }
     note_frame(frame.t_ns);
-    std::optional<Estimate> estimate = update(*features);
-    load_.add(clock_() - start);
+    std::optional<Estimate> estimate = timed([&] { return estimator_->process(*features); });
+    load_.add(clock_() - start, frame.t_ns);
     return estimate;
   }
 
   std::optional<Estimate> process_step(TimeNs t_ns) {
     stage_times_ = StageTimes{};
-    FeatureFrame nothing;
     if (!is_time(t_ns)) {
       ++steps_.implausible;
       return std::nullopt;
     }
-    nothing.t_ns = estimator_->camera_time(t_ns);
-    return accepts(nothing.t_ns, steps_) ? update(nothing) : std::nullopt;
+    const TimeNs stamp_ns = estimator_->camera_time(t_ns);
+    if (!accepts(stamp_ns, steps_)) return std::nullopt;
+    return timed([&] { return estimator_->process_without_image(stamp_ns); });
   }
 
   /// Is a frame with this stamp later than the one before, and are its inertial samples there? Counts those that are
@@ -170,10 +170,10 @@ class Odometry::Impl {
   }
 
   /// Whether this frame is used at all, and how much of it: as the budget allows.
-  bool takes_turn() {
+  bool takes_turn(TimeNs t_ns) {
     const LoadLimits limits = load_.limits();
     if (++frames_left_out_ < limits.frame_every) {
-      load_.add(0.0);
+      load_.add(0.0, t_ns);
       return false;
     }
     frames_left_out_ = 0;
@@ -190,9 +190,11 @@ class Odometry::Impl {
     ++camera_.accepted;
   }
 
-  std::optional<Estimate> update(const FeatureFrame& features) {
+  /// What the estimator's work comes to, and how long it takes.
+  template <typename Work>
+  std::optional<Estimate> timed(const Work& work) {
     const auto start = std::chrono::steady_clock::now();
-    std::optional<Estimate> estimate = estimator_->process(features);
+    std::optional<Estimate> estimate = work();
     stage_times_.filter = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     if (estimate) estimate->health.load_step = load_.step();
     return estimate;

@@ -135,7 +135,7 @@ void QueuedOdometry::drop_old_frames() {
   }
 }
 
-void QueuedOdometry::tell_state() { live_.tell(odometry_.predict(newest_imu_ns_), newest_imu_ns_); }
+void QueuedOdometry::set_live_state() { live_.set(odometry_.predict(newest_imu_ns_), newest_imu_ns_); }
 
 /// By the thread that estimates, since a sensor's must not wait for a file.
 void QueuedOdometry::log_overflows() {
@@ -164,14 +164,14 @@ Progress QueuedOdometry::process(std::optional<Estimate>& estimate) {
   if (newest_imu_ns_ < frame_ns && !frames_.queue.full()) return Progress::no_frame;
   estimate = odometry_.add_stereo(view_of(*frame));
   frames_.queue.pop();
-  tell_state();
+  set_live_state();
   return estimate ? Progress::estimated : Progress::taken;
 }
 
 std::optional<Estimate> QueuedOdometry::step(TimeNs t_ns) {
   hand_over(t_ns);
   std::optional<Estimate> estimate = odometry_.step(t_ns);
-  tell_state();
+  set_live_state();
   return estimate;
 }
 
@@ -185,7 +185,7 @@ void QueuedOdometry::reset() {
   drop_all(frames_);
   newest_imu_ns_ = std::numeric_limits<TimeNs>::min();
   odometry_.reset();
-  live_.tell(std::nullopt, 0);
+  live_.set(std::nullopt, 0);
 }
 
 Overflows QueuedOdometry::overflows() const {

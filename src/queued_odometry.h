@@ -103,7 +103,7 @@ class QueuedOdometry {
   void drop_old_frames();
   void hand_over(TimeNs until_ns);
   void log_overflows();
-  void tell_state();
+  void set_live_state();
 
   Odometry odometry_;
   bool drops_frames_;

@@ -106,7 +106,7 @@ void HealthMonitor::add_refused_frame(TimeNs imu_ns) {
 
 /// Sensors that are silent count as little as those that are wrong.
 void HealthMonitor::note_silence(TimeNs t_ns) {
-  if (!images_.expected() || images_.come(t_ns)) return;
+  if (!life_.any_frame || images_.come(t_ns)) return;
   images_.add_silence(t_ns);
   for (const Source source : {Source::gyroscope, Source::accelerometer}) faults_[index_of(source)].add(false, t_ns);
   decide(t_ns);
@@ -114,7 +114,14 @@ void HealthMonitor::note_silence(TimeNs t_ns) {
 
 void HealthMonitor::add_frame(const Frame& frame, const std::array<SourceRecord, kSourceCount>& records) {
   const TimeNs t_ns = frame.t_ns;
+  life_.any_frame = true;
+  const Frame before = last_;
   last_ = frame;
+  if (!frame.image && images_.come(t_ns)) {  // between two images: what the last one showed holds
+    last_.statistics.tracks = before.statistics.tracks;
+    last_.statistics.stereo = before.statistics.stereo;
+    last_.agreement = before.agreement;
+  }
   arrivals_.refused_imu_ns.reset();
   if (frame.image) {
     images_.add({t_ns, arrivals_.imu_ns.value_or(t_ns), frame.running, frame.agreement, frame.statistics});
@@ -130,7 +137,7 @@ void HealthMonitor::add_frame(const Frame& frame, const std::array<SourceRecord,
   health_.horizontal_sigma = frame.horizontal_sigma;
   health_.vertical_sigma = frame.vertical_sigma;
   decide(t_ns);
-  health_.quality = quality(frame);
+  health_.quality = quality(last_);
 }
 
 /// Wheels and beams have something to show on the ground only.

@@ -93,6 +93,7 @@ class HealthMonitor {
   /// Since when the estimator is what it is.
   struct Life {
     bool started = false;
+    bool any_frame = false;  ///< with an image or without
     TimeNs aided_ns = 0;
     TimeNs fitting_ns = 0;  ///< when something last did not contradict the state
     bool contradicted = false;

@@ -38,7 +38,6 @@ class ImageHealth {
 
   /// Did one come not long ago?
   [[nodiscard]] bool come(TimeNs t_ns) const;
-  [[nodiscard]] bool expected() const { return arrival_ns_.has_value(); }
   [[nodiscard]] double interval() const { return interval_; }  ///< usual, of the images [s]
   /// Do the images carry the estimate? They may where some of what they show is wrong, and where they come late but
   /// fit.

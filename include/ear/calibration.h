@@ -1,4 +1,4 @@
-// What a recording or a vehicle says about its sensors: geometry, lenses, noise. Frames: docs/design.md, section 1.
+// The sensors of a recording or a vehicle: geometry, lenses, noise. Frames: docs/design.md, section 1.
 #pragma once
 
 #include <Eigen/Core>

@@ -183,11 +183,12 @@ typedef struct {
 
 /* Hands the waiting samples to the estimator, ordered by time, and then the oldest frame, once inertial samples reach
  * its time or all slots are taken. EAR_OK: *estimate is that frame's. EAR_NO_ESTIMATE: before the start, and of a frame
- * that is left out to keep ear_settings.budget_ms. Call it until it says EAR_NOTHING; it never waits. */
+ * that is left out to keep ear_settings.budget_ms. Call it until it returns EAR_NOTHING; it never waits. */
 ear_result ear_process(ear_odometry* odometry, ear_estimate* estimate);
 
-/* The estimate at a time without an image, from all other sensors: for vehicles without a camera, and while its images
- * do not come. IMU time. Samples that wait are handed to the estimator before. */
+/* The estimate at a time without an image [ns, IMU time], from all other sensors; as Odometry::step() of
+ * ear/odometry.h. EAR_NO_ESTIMATE with cameras, off the ground; see ear_predict(). Waiting samples up to that time are
+ * handed over. */
 ear_result ear_step(ear_odometry* odometry, int64_t t_ns, ear_estimate* estimate);
 
 /* The newest state carried on to a time by the inertial samples that ear_process() and ear_step() took, at any rate.
@@ -201,11 +202,11 @@ ear_result ear_live_state(const ear_odometry* odometry, ear_state* state);
 
 ear_status ear_status_of(const ear_odometry* odometry);
 
-/* -- what the estimator says of itself and of its sensors; meanings, thresholds and times: docs/health.md -- */
+/* -- what the estimator reports of itself and of its sensors; meanings, thresholds and times: docs/health.md -- */
 
 typedef enum {
   EAR_HEALTH_INITIALISING = 0, /* there was no estimate yet */
-  EAR_HEALTH_TRACKING = 1,     /* each sensor is trusted, or is rightly silent */
+  EAR_HEALTH_TRACKING = 1,     /* no sensor is faulty; some may be rightly silent */
   EAR_HEALTH_DEGRADED = 2,     /* the estimate may be used, but rests on fewer sensors than it should */
   EAR_HEALTH_LOST = 3          /* it may be anywhere, and none is given */
 } ear_health_status;
@@ -252,7 +253,7 @@ ear_result ear_health_of(const ear_odometry* odometry, ear_health* health);
 /* The name of a source, such as "wheel_left"; "unknown source" for what is none. */
 const char* ear_source_text(ear_source source);
 
-/* What was refused since the start; nothing is lost silently. */
+/* What was refused since the start: no sample is dropped without being counted. */
 typedef struct {
   uint64_t imu_overflow, encoder_overflow, laser_overflow, frame_overflow; /* the queue was full, or too full */
   uint64_t imu_rejected, encoder_rejected, laser_rejected;                 /* not finite, out of order, too late */

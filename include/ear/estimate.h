@@ -1,4 +1,4 @@
-// What the estimator gives away: the state with its covariance, what each frame was used for, how far the sensors
+// What the estimator reports: the state with its covariance, what each frame was used for, how far the sensors
 // agree, and what was refused.
 #pragma once
 
@@ -62,20 +62,20 @@ struct TerrainEstimate {
   double sigma_across = 0.0;  ///< [rad]
 };
 
-/// The sensors that each tell how far the body went.
+/// The sensors that each measure how far the body moved.
 enum class MotionSensor : std::uint8_t { imu, odometer, camera };
 inline constexpr std::size_t kMotionSensors = 3;
 
-/// How far the sensors agree about the way since the frame before: the paper's (13)-(15); docs/anomaly.md. Arrays are
+/// How far the sensors agree on the path since the frame before: the paper's (13)-(15); docs/anomaly.md. Arrays are
 /// in the order of MotionSensor; coefficients, score and threshold have the unit of AnomalyConfig::score.
 struct Consistency {
-  std::array<bool, kMotionSensors> available{};      ///< who told of a displacement
+  std::array<bool, kMotionSensors> available{};      ///< which measured a displacement
   std::array<double, kMotionSensors> coefficient{};  ///< how far each is from the others, (14)
-  std::array<double, kMotionSensors> weight{};       ///< (15): 1 is trusted, 0 told nothing
+  std::array<double, kMotionSensors> weight{};       ///< (15): from 1, as it is, to 0, not used
   double variance = 0.0;                             ///< of the displacements, (13) [m^2]
   double score = 0.0;                                ///< above the threshold they disagree
   double threshold = 0.0;
-  std::optional<MotionSensor> anomalous;  ///< who is at fault; of two that disagree, nobody knows who
+  std::optional<MotionSensor> anomalous;  ///< the faulty one; empty where two disagree, as it may be either
 
   [[nodiscard]] bool disagree() const { return score > threshold; }
 };
@@ -102,8 +102,8 @@ struct StreamCounts {
   [[nodiscard]] std::uint64_t rejected() const { return not_finite + implausible + not_later + far_ahead + too_late; }
 };
 
-/// What was refused or bridged since the start; nothing is lost silently. How far the samples accepted agree with the
-/// state is in Health::sources.
+/// What was refused or bridged since the start: no sample is dropped without being counted. How far the samples
+/// accepted agree with the state is in Health::sources.
 struct InputCounts {
   StreamCounts imu;               ///< gaps: longer than FilterConfig::max_imu_gap
   StreamCounts encoder;           ///< gaps: longer than 0.25 s

@@ -7,12 +7,12 @@ namespace ear {
 
 /// How the filter recognises that the vehicle stands, and how firmly it then holds the pose.
 struct StandstillConfig {
-  double duration = 0.5;           ///< [s] stillness before it is believed
+  double duration = 0.5;           ///< [s] stillness before the vehicle counts as standing
   double max_gyro = 0.02;          ///< [rad/s] mean rate less the bias
   double max_gyro_at_start = 0.2;  ///< [rad/s] the same before the bias is known: the largest bias of any sensor
   double max_gyro_spread = 0.15;   ///< [rad/s] standard deviation of the samples over `duration`, vibration included
   double max_accel_spread = 3.0;   ///< [m/s^2] the same for the specific force
-  double max_flow_px = 0.5;        ///< [px] common motion of the features until the vehicle is said to stand
+  double max_flow_px = 0.5;        ///< [px] common motion of the features until the vehicle counts as standing
   double leave_flow_px = 1.0;      ///< [px] common motion since it stopped that ends it: legs give under rotors
   double position_sigma = 1e-3;    ///< [m] how far a standing vehicle may shift
   double rotation_sigma = 5e-4;    ///< [rad]
@@ -65,7 +65,7 @@ struct OdometerConfig {
   double body_yaw = 2.5e-3;      ///< the same to the sides [rad sqrt(s)]
   double speed_sigma = 1e-3;     ///< [m/s] every row, also of standing wheels
   double yaw_rate_sigma = 0.02;  ///< [rad/s]
-  double normal_walk = 0.1;      ///< how the ground's normal turns [rad/sqrt(m)]
+  double normal_walk = 0.1;      ///< change of the ground's normal [rad/sqrt(m)]
   double normal_prior = 0.3;     ///< [rad] before the lasers saw it
   double unevenness = 0.008;     ///< [m] of the ground under a beam against the plane through the wheels
 };
@@ -74,19 +74,19 @@ struct OdometerConfig {
 struct ContactConfig {
   double takeoff_height = 0.005;    ///< [m] wheels above the ground, after standing, that are a take-off
   double unevenness = 0.025;        ///< [m] on top of it while they roll
-  double takeoff_duration = 0.04;   ///< [s] for which the beams must say so
+  double takeoff_duration = 0.04;   ///< [s] for which the beams must show it
   double touchdown_height = 0.025;  ///< [m] wheels below it, neither rising nor falling, stand on the ground
-  double touchdown_duration = 0.2;  ///< [s] for which the beams must say so
+  double touchdown_duration = 0.2;  ///< [s] for which the beams must show it
   double touchdown_climb = 0.06;    ///< [m/s] neither rising nor falling
   double confirmed_height = 0.05;   ///< [m] below it a strike, or wheels that are spun up, is a touchdown at once
   double strike = 10.0;             ///< [m/s^2] change of the specific force's magnitude
 };
 
-/// Which inertial samples are less certain than the sensor's noise says: strikes, spikes, clipped values.
+/// Which inertial samples are less certain than the sensor's noise alone: strikes, spikes, clipped values.
 struct ImpactConfig {
   double accel_deviation = 10.0;  ///< [m/s^2] from the recent mean that is ordinary in any case
   double gyro_deviation = 4.0;    ///< [rad/s]
-  double accel_range = 0.0;       ///< [m/s^2] largest value of an axis; 0: not known, flat tops tell
+  double accel_range = 0.0;       ///< [m/s^2] largest value of an axis; 0: not known, flat tops show it
   double gyro_range = 0.0;        ///< [rad/s]
 };
 

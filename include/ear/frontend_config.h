@@ -1,4 +1,4 @@
-// Settings of the front end. Each default is one value for all recordings; docs/frontend.md says how it was found.
+// Settings of the front end. Each default is one value for all recordings; docs/frontend.md has the measurements.
 #pragma once
 
 namespace ear {
@@ -6,7 +6,7 @@ namespace ear {
 struct FrontendConfig {
   int max_features = 150;         ///< tracks kept at a time
   double nearest_depth = 0.15;    ///< [m] closer points are not searched for across the stereo pair
-  bool motion_prediction = true;  ///< look for features where the state's motion says; else where they were
+  bool motion_prediction = true;  ///< search features where the state's motion predicts them; else where they were
 };
 
 }  // namespace ear

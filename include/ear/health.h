@@ -1,5 +1,5 @@
-// What the estimator says of itself and of its sensors: can a flight controller act on the estimate, and which sensors
-// is it not based on? Meanings, thresholds and times: docs/health.md.
+// What the estimator reports of itself and of its sensors: can a flight controller act on the estimate, and which
+// sensors is it not based on? Meanings, thresholds and times: docs/health.md.
 #pragma once
 
 #include <array>
@@ -13,7 +13,7 @@ namespace ear {
 
 enum class HealthStatus : std::uint8_t {
   initialising,  ///< there was no estimate yet
-  tracking,      ///< each sensor is trusted, or is rightly silent, as wheels are in flight
+  tracking,      ///< no sensor is faulty; some may be rightly silent, as wheels are in flight
   degraded,      ///< the estimate may be used, but rests on fewer sensors than it should
   lost           ///< there was an estimate; now it may be anywhere, and none is given
 };

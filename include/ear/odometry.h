@@ -19,7 +19,7 @@
 
 namespace ear {
 
-/// The present time [s], of any origin: what tells how long frames take.
+/// The present time [s], of any origin: what the time that frames take is measured with.
 using Clock = std::function<double()>;
 
 class Odometry {
@@ -41,11 +41,12 @@ class Odometry {
   /// frame that is left out to keep PerformanceConfig::budget_ms; predict() goes on.
   std::optional<Estimate> add_stereo(const StereoFrame& frame);
 
-  /// The estimate at a time without an image (IMU time), from all other sensors: for vehicles without a camera, and
-  /// while its images do not come.
+  /// The estimate at a time without an image [ns, IMU time], from all other sensors: for vehicles without a camera,
+  /// while images do not come, and between them; tracks go on over it. Nothing with cameras, off the ground: see
+  /// predict().
   std::optional<Estimate> step(TimeNs t_ns);
 
-  /// The newest state, carried on by the inertial samples that came since. Nothing before the start, and while lost.
+  /// The newest state, carried on by the inertial samples since to `t_ns` (IMU time). Nothing before the start or lost.
   [[nodiscard]] std::optional<NavState> predict(TimeNs t_ns) const;
 
   [[nodiscard]] Status status() const;

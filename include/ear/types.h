@@ -46,7 +46,7 @@ struct LaserSample {
   std::vector<double> range;  ///< [m]
 };
 
-/// A view of somebody else's 8-bit grey image; it owns nothing.
+/// A view of an 8-bit grey image that belongs to the caller; it owns nothing.
 struct ImageView {
   const std::uint8_t* data = nullptr;
   int width = 0;
@@ -75,8 +75,8 @@ struct FeatureObservation {
 struct FeatureFrame {
   TimeNs t_ns = 0;
   std::vector<FeatureObservation> features;
-  bool right_skipped = false;  ///< nobody looked for them in the right image, though there is a second camera
-  bool repeated = false;       ///< the image is, byte for byte, the one before: a camera that delivers it twice
+  bool right_skipped = false;  ///< they were not searched in the right image, though there is a second camera
+  bool repeated = false;       ///< the left image is byte for byte the one before, and the features are as they were
 };
 
 }  // namespace ear

@@ -15,7 +15,8 @@ bool bags_are_built() { return false; }
 
 class BagWriter::Impl {};
 
-BagWriter::BagWriter(const std::filesystem::path& file, const BagTopics& /*topics*/, const Calibration& /*told*/) {
+BagWriter::BagWriter(const std::filesystem::path& file, const BagTopics& /*topics*/,
+                     const Calibration& /*calibration*/) {
   throw absent(file);
 }
 BagWriter::~BagWriter() = default;

@@ -15,7 +15,7 @@ constexpr int kPatienceMs = 50;  // how long the thread waits for bytes before i
 
 std::optional<TimeSync> answer_to(const Packet& packet, const Sender& self, TimeNs now_ns) {
   const std::optional<TimeSync> request = to_time_sync(packet.payload);
-  if (!request || request->tc1 != 0) return std::nullopt;  // not a request, but somebody's answer
+  if (!request || request->tc1 != 0) return std::nullopt;  // not a request, but the answer of another system
   const bool for_us = (request->target_system == 0 || request->target_system == self.system) &&
                       (request->target_component == 0 || request->target_component == self.component);
   if (!for_us) return std::nullopt;

@@ -1,5 +1,5 @@
-// The conversation with a flight controller: sends messages, says "I am here" once a second, and answers when asked for
-// the time. The last two on a thread of its own, so that an answer does not wait for an image.
+// The conversation with a flight controller: sends messages, a heartbeat once a second, and answers when asked for the
+// time. The last two on a thread of its own, so that an answer does not wait for an image.
 #pragma once
 
 #include <atomic>
@@ -21,7 +21,7 @@ namespace ear::mavlink {
 struct LinkCounts {
   std::uint64_t odometry = 0;      ///< ODOMETRY messages sent
   std::uint64_t time_answers = 0;  ///< TIMESYNC requests answered
-  std::uint64_t dropped = 0;       ///< messages that the line did not take, or that nobody was there for
+  std::uint64_t dropped = 0;       ///< messages that the line did not take, or that nothing was there to receive
 };
 
 class Link {
@@ -38,7 +38,7 @@ class Link {
   void send(const OdometryMessage& message);
   void send(const StatusText& message);
 
-  /// What the next heartbeats say.
+  /// The state in the next heartbeats.
   void set_state(SystemState state) { state_ = state; }
 
   [[nodiscard]] LinkCounts counts() const;

@@ -1,5 +1,6 @@
-// What to tell the flight controller, and when: ODOMETRY at 30 to 50 Hz while the estimate can be used, nothing while
-// it cannot, and a line of text when that changes. It sends nothing itself and has no clock: time comes with the data.
+// What to send to the flight controller, and when: ODOMETRY at 30 to 50 Hz while the estimate can be used, nothing
+// while it cannot, and a line of text when that changes. It sends nothing itself and has no clock: time comes with the
+// data.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,15 +16,15 @@
 
 namespace ear::mavlink {
 
-/// What the pilot is told of.
+/// What the pilot reads.
 enum class LinkHealth : std::uint8_t {
   starting,  ///< no estimate yet
   good,
-  weak,  ///< a sensor is not trusted, or little is seen: the estimate drifts sooner
+  weak,  ///< a sensor is faulty, or little is seen: the estimate drifts sooner
   lost   ///< there was an estimate, and there is none, or inertia alone carries it on
 };
 
-/// `faulty`: by whom a weak estimate does without.
+/// `faulty`: the sources that a weak estimate does without.
 [[nodiscard]] StatusText to_text(LinkHealth health, const SourceSet& faulty);
 [[nodiscard]] SystemState to_system_state(LinkHealth health);
 
@@ -35,7 +36,7 @@ class OdometryStream {
   /// Every inertial sample, in time order: the angular rate comes from these.
   void add_imu(const ImuSample& sample);
 
-  /// The outcome of one frame. The message to send, if any.
+  /// The outcome of one frame or step. The message to send, if any.
   [[nodiscard]] std::optional<OdometryMessage> add_frame(const std::optional<Estimate>& estimate, Status status);
 
   /// Where frames come at less than 30 Hz, predicted states fill the gaps: is one due at `t_ns`?

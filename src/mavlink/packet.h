@@ -9,7 +9,7 @@
 
 namespace ear::mavlink {
 
-/// Who speaks. The system is the vehicle; the component is this program on it.
+/// The sender. The system is the vehicle; the component is this program on it.
 struct Sender {
   std::uint8_t system = 1;
   std::uint8_t component = 197;  ///< MAV_COMP_ID_VISUAL_INERTIAL_ODOMETRY

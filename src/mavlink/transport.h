@@ -26,7 +26,7 @@ class Transport {
   Transport(Transport&&) = delete;
   Transport& operator=(Transport&&) = delete;
 
-  /// False if the bytes could not be taken at once, or nobody is there.
+  /// False if the bytes could not be taken at once, or nothing is there to receive them.
   bool send(const std::vector<std::uint8_t>& bytes);
 
   /// Waits until something comes, at most `timeout_ms`. The number of bytes in `bytes`.
@@ -40,7 +40,7 @@ class Transport {
   bool listens_ = false;  ///< udpin: the peer is whoever spoke last; else the file itself knows
   std::mutex peer_mutex_;
   sockaddr_storage peer_{};
-  socklen_t peer_length_ = 0;  ///< 0: nobody spoke yet
+  socklen_t peer_length_ = 0;  ///< 0: nothing came from there yet
 };
 
 }  // namespace ear::mavlink

@@ -9,7 +9,7 @@ namespace ear {
 
 /// Reads settings; the map `topics` is for ROS bags (src/bag/topics.h), and keys that are left out keep their defaults.
 /// Throws InputError, naming file, line and key, for a key that does not exist or a value of the wrong type. Whether a
-/// value makes sense is for the estimator to say.
+/// value makes sense is for the estimator to decide.
 [[nodiscard]] Config load_config(const std::filesystem::path& file);
 
 /// Writes all settings, so that load_config() gives back the same. Throws InputError if the file cannot be written.

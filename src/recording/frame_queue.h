@@ -17,7 +17,7 @@ namespace ear {
 
 /// The images of one instant, with their memory. Copies share it.
 struct RecordedFrame : StereoFrame {
-  TimeNs arrival_ns = 0;               ///< the stamp, unless the recording says that the frame came later
+  TimeNs arrival_ns = 0;               ///< the stamp, unless the recording states that the frame came later
   std::shared_ptr<const void> pixels;  ///< keeps what `left` and `right` point at
 };
 

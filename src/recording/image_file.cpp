@@ -22,7 +22,7 @@ std::vector<char> read_bytes(const std::filesystem::path& file) {
   return bytes;
 }
 
-// Decoders fill up an image that was cut off; only the missing end tells. Half a kilobyte of padding is accepted.
+// Decoders fill up an image that was cut off; only the missing end shows it. Half a kilobyte of padding is accepted.
 bool cut_off(std::string_view bytes) {
   constexpr std::size_t kPadding = 512;
   const std::string_view tail = bytes.substr(bytes.size() > kPadding ? bytes.size() - kPadding : 0);

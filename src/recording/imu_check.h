@@ -1,4 +1,4 @@
-// What the values of an IMU say about the sensor: does it clip, does it hang, how much noise has it at rest?
+// What the values of an IMU show of the sensor: does it clip, does it hang, how much noise does it have at rest?
 #pragma once
 
 #include <Eigen/Core>

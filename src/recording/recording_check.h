@@ -21,7 +21,7 @@ struct StreamReport {
   double covered_by_imu = 0.0;  ///< share of its time during which there are inertial samples: 0 to 1
 };
 
-/// What `ear check` says.
+/// What `ear check` reports.
 struct RecordingReport {
   std::vector<StreamReport> streams;
   ImuReport imu;

@@ -8,7 +8,7 @@
 
 namespace ear {
 
-/// What the stamps of a stream say.
+/// What the stamps of a stream show.
 struct TimingReport {
   std::size_t count = 0;
   TimeNs first_ns = 0;

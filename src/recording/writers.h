@@ -14,7 +14,7 @@
 
 namespace ear {
 
-/// A text file that is written line by line and says so when it cannot be (a full disk, for example).
+/// A text file that is written line by line and throws when it cannot be (a full disk, for example).
 class OutputFile {
  public:
   /// Throws InputError if the file cannot be created.
@@ -50,7 +50,7 @@ class StatesWriter {
   OutputFile out_;
 };
 
-/// What the estimator said of itself from some moment on.
+/// What the estimator reported of itself from some moment on.
 struct HealthChange {
   TimeNs t_ns = 0;
   std::string text;

@@ -305,3 +305,57 @@ TEST_CASE("health: what is not a number, or a velocity that may be anything, is 
   drive.go_on(0.05);
   CHECK(drive.health().status == HealthStatus::lost);
 }
+
+TEST_CASE("health: a step between two images is no image without features") {
+  Drive drive;
+  drive.go_on(1.0);
+  const auto step = [&] {
+    HealthMonitor::Frame frame = drive.frame;
+    frame.image = false;
+    frame.t_ns = at(drive.t - 0.02);
+    frame.statistics.tracks = frame.statistics.stereo = 0;
+    frame.agreement = FrameAgreement{};
+    drive.monitor.add_frame(frame, drive.records);
+  };
+  step();
+  CHECK(drive.health().aiding == Aiding::cameras_and_wheels);
+  CHECK(drive.health().quality == 100);
+  // Nor is it one that fits.
+  drive.frame.agreement.left = 0.9;
+  drive.frame.statistics.wheel_rows_used = 0;
+  for (int i = 0; i < 30; ++i) {
+    drive.go_on(0.05);
+    step();
+  }
+  CHECK(drive.monitor.contradicted());
+}
+
+TEST_CASE("health: cameras that never delivered are faulty once the wheels carry the vehicle") {
+  Drive drive;
+  drive.frame.image = false;
+  drive.frame.statistics.tracks = drive.frame.statistics.stereo = 0;
+  drive.frame.agreement = FrameAgreement{};
+  drive.go_on(1.0);
+  CHECK(drive.health().status == HealthStatus::degraded);
+  CHECK(drive.health().aiding == Aiding::wheels);
+  CHECK(drive.health().faulty[index_of(Source::camera_left)]);
+  CHECK(drive.health().faulty[index_of(Source::camera_right)]);
+  CHECK(drive.health().faulty.count() == 2);
+}
+
+TEST_CASE("health: without cameras too, the estimate is lost when nothing but inertial samples comes") {
+  Calibration calibration = vehicle();
+  calibration.cameras.clear();
+  Drive drive;
+  drive.monitor = HealthMonitor(calibration, true, true);
+  drive.frame.image = false;
+  drive.frame.statistics.tracks = drive.frame.statistics.stereo = 0;
+  drive.frame.agreement = FrameAgreement{};
+  drive.go_on(2.0);
+  CHECK(drive.health().status == HealthStatus::tracking);
+  CHECK(drive.health().aiding == Aiding::wheels);
+  drive.imu_until(drive.t + 1.5);
+  CHECK(drive.health().status != HealthStatus::lost);
+  drive.imu_until(drive.t + 3.0);
+  CHECK(drive.health().status == HealthStatus::lost);
+}

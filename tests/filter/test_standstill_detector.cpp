@@ -71,3 +71,19 @@ TEST_CASE("standstill: without features it is not known") {
     CHECK_FALSE(detector.update(empty, quiet(), Eigen::Vector3d::Zero(), 0.02, std::nullopt));
   }
 }
+
+TEST_CASE("standstill: steps without an image in between do not hide that it slides on wheels at rest") {
+  StandstillDetector detector(StandstillConfig{}, kFocal);
+  constexpr double kResting = 2.0;  // [s]
+  bool still = false;
+  const auto see = [&](int i, double shift_px) {
+    still = detector.update(frame_at(i * kFrame, shift_px), quiet(), Eigen::Vector3d::Zero(), 0.02, kResting);
+    FeatureFrame step;
+    step.t_ns = i * kFrame + kFrame / 2;
+    detector.update(step, quiet(), Eigen::Vector3d::Zero(), 0.02, kResting);
+  };
+  for (int i = 0; i < 40; ++i) see(i, 0.0);
+  CHECK(still);
+  for (int i = 40; i < 70; ++i) see(i, 0.1 * (i - 40));
+  CHECK_FALSE(still);
+}

@@ -56,9 +56,11 @@ Summary run(const fs::path& path, int max_frames, Predict&& predict, See&& see) 
     if (++summary.frames > max_frames) break;
     const FeatureFrame& features = frontend.process(*frame, predict(frame->t_ns));
     see(features);
-    for (const auto& feature : features.features) lengths[feature.id] += 1.0;
+    for (const auto& feature : features.features) {
+      lengths[feature.id] += 1.0;
+      stereo += feature.has_right ? 1.0 : 0.0;
+    }
     summary.features += static_cast<double>(features.features.size());
-    stereo += frontend.quality().stereo;
   }
   summary.frames = std::min(summary.frames, max_frames);
   summary.stereo_share = stereo / std::max(1.0, summary.features);

@@ -47,42 +47,42 @@ void check(const std::optional<NavState>& state, TimeNs t_ns) {
   CHECK(state->b_g == truth.b_g);
 }
 
-TEST_CASE("live state: nothing before a state was told; then at every sample, however late it was told") {
+TEST_CASE("live state: nothing before a state was set; then at every sample, however late it was set") {
   LiveState live(kSamples);
   for (int i = 0; i <= 50; ++i) {
     live.add(sample_at(i * kPeriod));
     CHECK_FALSE(live.state());
   }
-  live.tell(truth_at(10 * kPeriod), 10 * kPeriod);  // 40 samples ago
+  live.set(truth_at(10 * kPeriod), 10 * kPeriod);  // 40 samples ago
   for (int i = 51; i < 200; ++i) {
     live.add(sample_at(i * kPeriod));
     check(live.state(), i * kPeriod);
   }
 }
 
-TEST_CASE("live state: the newest state that was told counts") {
+TEST_CASE("live state: the newest state that was set counts") {
   LiveState live(kSamples);
   NavState wrong = truth_at(0);
   wrong.p_WB.x() += 5.0;
   live.add(sample_at(0));
-  live.tell(wrong, 0);
+  live.set(wrong, 0);
   live.add(sample_at(kPeriod));
   CHECK(live.state()->p_WB.x() > 4.0);
-  live.tell(wrong, 0);
-  live.tell(truth_at(kPeriod), kPeriod);
+  live.set(wrong, 0);
+  live.set(truth_at(kPeriod), kPeriod);
   live.add(sample_at(2 * kPeriod));
   check(live.state(), 2 * kPeriod);
-  live.tell(std::nullopt, 0);
+  live.set(std::nullopt, 0);
   live.add(sample_at(3 * kPeriod));
   CHECK_FALSE(live.state());
 }
 
 TEST_CASE("live state: one older than all samples is not used, and none lasts for ever") {
   LiveState live(kSamples);
-  live.tell(truth_at(0), 0);
+  live.set(truth_at(0), 0);
   for (int i = 10; i < 20; ++i) live.add(sample_at(i * kPeriod));
   CHECK_FALSE(live.state());
-  live.tell(truth_at(15 * kPeriod), 15 * kPeriod);
+  live.set(truth_at(15 * kPeriod), 15 * kPeriod);
   int last = 0;
   for (int i = 20; i < 1000; ++i) {
     live.add(sample_at(i * kPeriod));
@@ -94,7 +94,7 @@ TEST_CASE("live state: one older than all samples is not used, and none lasts fo
 TEST_CASE("live state: samples that cannot be change nothing; stamps that jump wait for the estimator") {
   LiveState live(kSamples);
   live.add(sample_at(0));
-  live.tell(truth_at(0), 0);
+  live.set(truth_at(0), 0);
   live.add(sample_at(kPeriod));
   ImuSample bad = sample_at(2 * kPeriod);
   bad.gyro_B.x() = std::numeric_limits<double>::quiet_NaN();
@@ -110,7 +110,7 @@ TEST_CASE("live state: samples that cannot be change nothing; stamps that jump w
   jumped.t_ns -= 1'000'000'000;
   live.add(jumped);
   CHECK_FALSE(live.state());
-  live.tell(truth_at(3 * kPeriod), jumped.t_ns);  // the estimator's time goes on
+  live.set(truth_at(3 * kPeriod), jumped.t_ns);  // the estimator's time goes on
   ImuSample next = sample_at(4 * kPeriod);
   next.t_ns -= 1'000'000'000;
   live.add(next);
@@ -121,18 +121,18 @@ TEST_CASE("live state: two threads") {
   constexpr int kEnd = 20000;
   LiveState live(kSamples);
   std::atomic<int> added{-1};
-  std::atomic<int> told{-1};
+  std::atomic<int> set_at{-1};
   std::thread estimator([&] {
-    while (told < kEnd - 1) {
+    while (set_at < kEnd - 1) {
       const int newest = added;
-      if (newest == told) continue;
-      live.tell(truth_at(newest * kPeriod), newest * kPeriod);
-      told = newest;
+      if (newest == set_at) continue;
+      live.set(truth_at(newest * kPeriod), newest * kPeriod);
+      set_at = newest;
     }
   });
   int wrong = 0, known = 0;
   for (int i = 0; i < kEnd; ++i) {
-    while (i - told > static_cast<int>(kSamples) / 2) std::this_thread::yield();
+    while (i - set_at > static_cast<int>(kSamples) / 2) std::this_thread::yield();
     live.add(sample_at(i * kPeriod));
     added = i;
     const std::optional<NavState> state = live.state();

@@ -19,22 +19,34 @@ namespace {
 
 constexpr LoadLimits kFull{150, 12, 1, 1};
 
+/// Stamps of frames at a constant rate.
+class Stamps {
+ public:
+  explicit Stamps(double rate_hz) : interval_ns_(std::llround(1e9 / rate_hz)) {}
+  TimeNs next() { return now_ns_ += interval_ns_; }
+
+ private:
+  TimeNs interval_ns_;
+  TimeNs now_ns_ = 0;
+};
+
 /// Feeds frames whose cost is that of all work times `share(step)`; the steps at which it changed.
 template <typename Share>
-std::vector<int> steps(LoadGovernor& load, int frames, double cost, const Share& share) {
+std::vector<int> steps(LoadGovernor& load, Stamps& stamps, int frames, double cost, const Share& share) {
   std::vector<int> visited{load.step()};
   for (int i = 0; i < frames; ++i) {
-    load.add(cost * share(load.step()));
+    load.add(cost * share(load.step()), stamps.next());
     if (load.step() != visited.back()) visited.push_back(load.step());
   }
   return visited;
 }
 
 TEST_CASE("load: without a budget, or within it, nothing is left out") {
+  Stamps stamps(30.0);
   LoadGovernor unlimited(0.0, kFull);
-  CHECK(steps(unlimited, 1000, 10.0, [](int) { return 1.0; }) == std::vector<int>{0});
+  CHECK(steps(unlimited, stamps, 1000, 10.0, [](int) { return 1.0; }) == std::vector<int>{0});
   LoadGovernor easy(0.010, kFull);
-  CHECK(steps(easy, 1000, 0.009, [](int) { return 1.0; }) == std::vector<int>{0});
+  CHECK(steps(easy, stamps, 1000, 0.009, [](int) { return 1.0; }) == std::vector<int>{0});
   const LoadLimits limits = easy.limits();
   CHECK(limits.max_features == 150);
   CHECK(limits.window == 12);
@@ -43,11 +55,12 @@ TEST_CASE("load: without a budget, or within it, nothing is left out") {
 }
 
 TEST_CASE("load: steps come in order, and each leaves no more work than the one before") {
+  Stamps stamps(30.0);
   LoadGovernor load(0.010, kFull);
   LoadLimits before = load.limits();
   for (int step = 1; step <= LoadGovernor::kLastStep; ++step) {
     CAPTURE(step);
-    for (int i = 0; i < 100 && load.step() < step; ++i) load.add(0.011);
+    for (int i = 0; i < 100 && load.step() < step; ++i) load.add(0.011, stamps.next());
     REQUIRE(load.step() == step);
     const LoadLimits now = load.limits();
     CHECK(now.max_features <= before.max_features);
@@ -59,39 +72,73 @@ TEST_CASE("load: steps come in order, and each leaves no more work than the one 
   CHECK(load.limits().window >= 3);
   CHECK(load.limits().max_features >= 1);
   CHECK(load.limits().frame_every == 4);
-  load.add(0.1);
+  load.add(0.1, stamps.next());
   CHECK(load.step() == LoadGovernor::kLastStep);
 }
 
 TEST_CASE("load: one slow frame is none") {
+  Stamps stamps(30.0);
   LoadGovernor load(0.010, kFull);
-  for (int i = 0; i < 800; ++i) load.add(i % 100 == 0 ? 0.030 : 0.005);
+  for (int i = 0; i < 800; ++i) load.add(i % 100 == 0 ? 0.030 : 0.005, stamps.next());
   CHECK(load.step() == 0);
 }
 
 TEST_CASE("load: frames that take very long are answered sooner") {
+  Stamps stamps(30.0);
   LoadGovernor load(0.010, kFull);
-  load.add(0.070);
+  load.add(0.070, stamps.next());
   CHECK(load.step() == 0);
-  load.add(0.070);
+  load.add(0.070, stamps.next());
   CHECK(load.step() == 1);
-  load.add(0.100);
+  load.add(0.100, stamps.next());
   CHECK(load.step() == 2);
 }
 
-TEST_CASE("load: it comes back step by step when the cost falls, and later than it went") {
+TEST_CASE("load: it comes back step by step when the cost falls, after the same time at every rate") {
+  for (const double rate_hz : {5.0, 20.0, 30.0, 60.0}) {
+    CAPTURE(rate_hz);
+    Stamps stamps(rate_hz);
+    LoadGovernor load(0.010, kFull);
+    steps(load, stamps, 24, 0.011, [](int) { return 1.0; });
+    REQUIRE(load.step() == 3);
+    for (const int next : {2, 1, 0}) {
+      int frames = 0;
+      for (; load.step() != next && frames < 1000; ++frames) load.add(0.002, stamps.next());
+      CHECK(frames / rate_hz > 1.5);
+      CHECK(frames / rate_hz < 1.65 + 8.0 / rate_hz);  // frames are looked at by eights
+    }
+  }
+}
+
+TEST_CASE("load: at 30 Hz it waits for 48 frames") {
+  Stamps stamps(30.0);
   LoadGovernor load(0.010, kFull);
-  steps(load, 24, 0.011, [](int) { return 1.0; });
+  steps(load, stamps, 24, 0.011, [](int) { return 1.0; });
   REQUIRE(load.step() == 3);
-  CHECK(steps(load, 40, 0.002, [](int) { return 1.0; }) == std::vector<int>{3});  // it waits
-  CHECK(steps(load, 400, 0.002, [](int) { return 1.0; }) == std::vector<int>{3, 2, 1, 0});
+  CHECK(steps(load, stamps, 47, 0.002, [](int) { return 1.0; }) == std::vector<int>{3});
+  CHECK(steps(load, stamps, 1, 0.002, [](int) { return 1.0; }) == std::vector<int>{3, 2});
+}
+
+TEST_CASE("load: while no frames come, nothing shows that there is time for more") {
+  LoadGovernor load(0.010, kFull);
+  Stamps before(30.0);
+  steps(load, before, 8, 0.011, [](int) { return 1.0; });
+  REQUIRE(load.step() == 1);
+  const TimeNs gap_ns = 10'000'000'000;
+  TimeNs t_ns = 0;
+  for (int i = 0; i < 8; ++i) {
+    t_ns = before.next() + gap_ns;
+    load.add(0.002, t_ns);
+  }
+  CHECK(load.step() == 1);
 }
 
 TEST_CASE("load: where a step is the right one, it is left less and less often") {
+  Stamps stamps(30.0);
   LoadGovernor load(0.010, kFull);
   // Step 1 is well within the budget, all work is not.
   const auto share = [](int step) { return step == 0 ? 1.0 : 0.5; };
-  const auto changes = [&](int frames) { return steps(load, frames, 0.011, share).size() - 1; };
+  const auto changes = [&](int frames) { return steps(load, stamps, frames, 0.011, share).size() - 1; };
   const std::size_t first = changes(2000);
   const std::size_t later = changes(2000);
   CHECK(first >= 3);

@@ -190,6 +190,32 @@ TEST_CASE("camera faults: a frozen image shows the same again and again") {
     }
     // Nobody follows a feature over two seconds without a new image.
     for (const std::uint64_t id : ids_of(faulty.tracks(last + 61))) CHECK(before.count(id) == 0);
+    for (std::size_t i = 0; i < faulty.frames().size(); ++i) {
+      CHECK(faulty.tracks(i).repeated == within(taken(faulty, i)));
+      CHECK_FALSE(clean.tracks(i).repeated);
+    }
+  }
+  SUBCASE("left alone: with its features it is repeated, though not in the right image") {
+    const Simulation faulty = with_fault(options, "camera_frozen.left@4+2");
+    check_clean_outside(clean, faulty);
+    for (std::size_t i = 0; i < faulty.frames().size(); ++i) {
+      CHECK(faulty.tracks(i).repeated == within(taken(faulty, i)));
+    }
+  }
+  SUBCASE("with frames that do not arrive, and exchanged") {
+    Options both = options;
+    both.faults = {parse_fault("camera_frozen@4+2"), parse_fault("camera_dropped@4+1")};
+    const Simulation dropped(both);
+    for (std::size_t i = 0; i < dropped.frames().size(); ++i) {  // the image before the fault did arrive
+      CHECK(dropped.tracks(i).repeated == within(taken(dropped, i)));
+    }
+    both.faults = {parse_fault("camera_frozen@4+2"), parse_fault("camera_swapped@5+1")};
+    const Simulation swapped(both);
+    // At 5 s the right image takes the place of the left one: it was not there before.
+    for (std::size_t i = last + 1; i < last + 61; ++i) {
+      const bool first_swapped = !(taken(swapped, i - 1) >= 5.0 - 1e-6) && taken(swapped, i) >= 5.0 - 1e-6;
+      CHECK(swapped.tracks(i).repeated == !first_swapped);
+    }
   }
   SUBCASE("for a moment: tracks go on") {
     const Simulation faulty = with_fault(options, "camera_frozen@4+0.1");
@@ -206,6 +232,7 @@ TEST_CASE("camera faults: a frozen image shows the same again and again") {
       ++pairs;
       CHECK(seen.right == find(clean.tracks(last), seen.id)->right);
     }
+    for (std::size_t i = 0; i < faulty.frames().size(); ++i) CHECK_FALSE(faulty.tracks(i).repeated);
     CHECK(pairs > 30);
   }
 }

@@ -42,7 +42,7 @@ LoadLimits full() { return {FrontendConfig{}.max_features, FilterConfig{}.window
 
 LoadGovernor at_step(int step) {
   LoadGovernor load(kBudget, full());
-  while (load.step() < step) load.add(2.0 * kBudget);
+  while (load.step() < step) load.add(2.0 * kBudget, 0);
   return load;
 }
 

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <functional>
+#include <optional>
 #include <unordered_map>
 #include <utility>
 
@@ -231,6 +232,7 @@ std::vector<FeatureFrame> fault_tracks(const Tracks& clean, const std::vector<Fr
   }
 
   std::vector<FeatureFrame> result;
+  std::optional<Shot> before;  // what the left image of the last frame shows
   Renaming renaming(next_id);
   const double interval = exposures.size() < 2 ? 0.0 : seconds_between(exposures[0], exposures[1]);
   for (const Frame& frame : frames) {
@@ -244,7 +246,10 @@ std::vector<FeatureFrame> fault_tracks(const Tracks& clean, const std::vector<Fr
       }
     }
     FeatureFrame faulty{frame.t_ns, join(eyes)};
-    const bool fresh = shown(exposures, setting.faults, {frame.exposure, 0}).exposure == frame.exposure;
+    const Shot left = shown(exposures, setting.faults, {frame.exposure, 0});
+    faulty.repeated = before && left.exposure == before->exposure && left.camera == before->camera;
+    before = left;
+    const bool fresh = left.exposure == frame.exposure;
     renaming.apply(faulty, motion_time(frame.taken_ns), fresh, std::max(kPatience, 1.5 * interval));
     result.push_back(std::move(faulty));
   }

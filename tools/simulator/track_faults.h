@@ -28,8 +28,9 @@ struct TrackFaults {
 /// wherever they are to be seen:
 /// - covered: none; too little or too much light: fewer, noisier
 /// - people: those behind them are lost, others are on them and move with them
-/// - frozen: the same positions again; swapped: left as right and right as left, each through the other's lens
-/// A track that is interrupted, or is not seen anew for 0.25 s, goes on under a new id, as a front end would have it.
+/// - frozen: the same positions again, with the left image's marked as repeated; swapped: left as right and right as
+/// left, each through the other's lens A track that is interrupted, or is not seen anew for 0.25 s, goes on under a new
+/// id, as a front end would have it.
 [[nodiscard]] std::vector<FeatureFrame> fault_tracks(const Tracks& clean, const std::vector<Frame>& frames,
                                                      const TrackFaults& setting);
 

@@ -48,16 +48,25 @@ Displacement Cameras::displacement(const FeatureFrame& frame, TimeNs t_ns, const
   return displacement_.add(frame, ekf.state().camera, motion.R_BiBj, motion.rotation_variance + bias);
 }
 
+Pose Cameras::image_pose(const State& x) const {
+  if (!last_->clone) return last_->T_WB;
+  const auto clone =
+      std::find_if(x.clones.begin(), x.clones.end(), [this](const Clone& c) { return c.frame == *last_->clone; });
+  if (clone == x.clones.end()) return last_->T_WB;  // it was marginalised
+  const Pose& T_WB = clone->T_WB;
+  return {T_WB.R * last_->in_clone.R, T_WB.R * last_->in_clone.p + T_WB.p};
+}
+
 /// The body now, in the body at the last image.
-Pose Cameras::motion_since_image(const ImuState& x) const {
-  const Eigen::Matrix3d R_BW = last_->T_WB.R.transpose();
-  return {R_BW * x.R_WB, R_BW * (x.p_WB - last_->T_WB.p)};
+Pose Cameras::motion_since_image(const State& x) const {
+  const Pose T_WB0 = image_pose(x);
+  return {T_WB0.R.transpose() * x.imu.R_WB, T_WB0.R.transpose() * (x.imu.p_WB - T_WB0.p)};
 }
 
 bool Cameras::bridge(const FeatureFrame& frame, Ekf& ekf) {
   const State& x = ekf.state();
   if (!last_ || count_ < 2 || x.clones.empty()) return false;
-  const Pose moved = motion_since_image(x.imu);
+  const Pose moved = motion_since_image(x);
   StereoMotion start;
   start.R_B0B1 = moved.R;
   start.p_B0B1 = moved.p;
@@ -99,7 +108,7 @@ FrameAgreement Cameras::compare(const FeatureFrame& frame, const Ekf& ekf) {
   const State& x = ekf.state();
   const double dt = last_ ? seconds_between(last_->t_ns, frame.t_ns) : 0.0;
   if (last_ && dt <= kOldImage) {
-    const Pose moved = motion_since_image(x.imu);
+    const Pose moved = motion_since_image(x);
     const double sigma_v = std::sqrt(ekf.covariance().matrix().diagonal().segment<3>(err::nu).maxCoeff());
     agreement = frame_check_.compare(last_features_, frame, {moved.R, moved.p, dt * sigma_v}, x.camera, noise_);
     agreement.apparent_rate = apparent_rate(dt, ekf);
@@ -132,15 +141,21 @@ void Cameras::marginalise(std::optional<std::size_t> clone, Ekf& ekf) {
 }
 
 void Cameras::remember(const FeatureFrame& frame, const Ekf& ekf) {
-  const ImuState& x = ekf.state().imu;
-  last_ = LastImage{frame.t_ns, {x.R_WB, x.p_WB}, ekf.rate_B()};
+  const State& x = ekf.state();
+  last_ = LastImage{frame.t_ns, {x.imu.R_WB, x.imu.p_WB}, std::nullopt, {}, ekf.rate_B()};
   last_features_ = frame;
+  if (x.clones.empty()) return;
+  const Clone& clone = x.clones.back();
+  const Eigen::Matrix3d R_BW = clone.T_WB.R.transpose();
+  last_->clone = clone.frame;
+  last_->in_clone = {R_BW * x.imu.R_WB, R_BW * (x.imu.p_WB - clone.T_WB.p)};
 }
 
 void Cameras::reset() {
   tracks_.clear();
   window_.reset();
   displacement_.clear();
+  if (last_) last_->clone.reset();
 }
 
 }  // namespace ear

@@ -23,7 +23,9 @@ namespace ear {
 /// The last image that was used.
 struct LastImage {
   TimeNs t_ns = 0;                                   ///< its camera stamp
-  Pose T_WB;                                         ///< the body then
+  Pose T_WB;                                         ///< the body then, as it was estimated then
+  std::optional<std::uint64_t> clone;                ///< Clone::frame of the newest clone then
+  Pose in_clone;                                     ///< the body then, in that clone
   Eigen::Vector3d rate_B = Eigen::Vector3d::Zero();  ///< its rate then [rad/s]
 };
 
@@ -59,12 +61,15 @@ class Cameras {
   /// The frame was used; the next one is compared with it.
   void remember(const FeatureFrame& frame, const Ekf& ekf);
   [[nodiscard]] const std::optional<LastImage>& last_image() const { return last_; }
+  /// Where the body was at the last image, by all that was measured since: what wheels and lasers measure until the next
+  /// image corrects clone and state alike, and is no motion. There must be an image.
+  [[nodiscard]] Pose image_pose(const State& x) const;
 
   /// The state begins anew.
   void reset();
 
  private:
-  [[nodiscard]] Pose motion_since_image(const ImuState& x) const;
+  [[nodiscard]] Pose motion_since_image(const State& x) const;
   [[nodiscard]] double apparent_rate(double dt, const Ekf& ekf) const;
   void marginalise(std::optional<std::size_t> clone, Ekf& ekf);
 

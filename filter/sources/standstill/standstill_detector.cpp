@@ -48,7 +48,7 @@ bool StandstillDetector::update(const FeatureFrame& frame, const ImuStatistics& 
     return false;
   }
   standing_ = seconds_between(since_ns_, frame.t_ns) >= config_.duration;
-  if (standing_) renew_reference(frame);
+  if (standing_ && !frame.features.empty()) renew_reference(frame);
   return standing_;
 }
 
