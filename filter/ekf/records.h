@@ -1,6 +1,7 @@
 // What came of the measurements of one frame: the innovation record of every sensor, and counts.
 #pragma once
 
+#include <Eigen/Core>
 #include <array>
 
 #include "ear/estimate.h"
@@ -38,6 +39,23 @@ class InnovationLog {
 
  private:
   std::array<SourceRecord, kSourceCount> records_{};
+};
+
+/// What updates did to the biases: the corrections, and by how much they lowered the variances. Gyroscope [rad/s], then
+/// accelerometer [m/s^2].
+struct BiasChange {
+  using Vector6 = Eigen::Matrix<double, 6, 1>;
+  Vector6 correction = Vector6::Zero();
+  Vector6 variance_lowered = Vector6::Zero();
+
+  void add(const Vector6& more_correction, const Vector6& more_lowered) {
+    correction += more_correction;
+    variance_lowered += more_lowered.cwiseMax(0.0);
+  }
+};
+struct BiasChanges {
+  BiasChange all, by_images;
+  bool restarted = false;  ///< what came before does not count
 };
 
 /// What the sources write while a frame is processed.

@@ -3,7 +3,8 @@
 // that is elsewhere. docs/filter.md, section 15.
 #pragma once
 
-#include "filter/ekf/ekf.h"
+#include "ear/types.h"
+#include "filter/ekf/records.h"
 
 namespace ear {
 

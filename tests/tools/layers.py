@@ -9,17 +9,38 @@ from pathlib import Path
 
 STANDARD = ["freestanding", "hosted"]  # the C++ library; the filter has only the first, see HOSTED
 
+RECORDS = ["filter/ekf/records.h", "filter/ekf/displacement.h", "filter/ekf/gate.h", "filter/sources/cameras/frame_agreement.h"]
+SOURCES = ["filter/sources/", "filter/sources/cameras/", "filter/sources/cameras/frame_agreement.h", "filter/sources/wheels/",
+           "filter/sources/ground/", "filter/sources/standstill/"]
+BELOW_SOURCES = ["filter/ekf/", *RECORDS[:3], "filter/ingest/", "include/ear/", "eigen", "freestanding"]
+FILTER = ["filter/", "filter/advice.h", "filter/ingest/", "filter/ekf/", *RECORDS, *SOURCES, "filter/start/", "filter/health/"]
+
 # What the files of a folder may include: layers and libraries. A file belongs to the longest folder that holds it.
 LAYERS = {
     "include/ear/": ["include/ear/", "eigen", *STANDARD],
-    "filter/": ["filter/", "include/ear/", "eigen", "freestanding"],
-    "smoother/": ["smoother/", "filter/", "include/ear/", "eigen", "ceres", "freestanding"],
+    # Inside the filter data flows one way: ingest -> ekf -> sources -> start; health sees records and no state.
+    "filter/": [*FILTER, "include/ear/", "eigen", "freestanding"],
+    "filter/advice.h": ["filter/ekf/displacement.h", "include/ear/", "freestanding"],
+    "filter/ingest/": ["filter/ingest/", "include/ear/", "eigen", "freestanding"],
+    "filter/ekf/": ["filter/ekf/", *RECORDS[:3], "filter/ingest/", "include/ear/", "eigen", "freestanding"],
+    "filter/ekf/displacement.h": ["include/ear/", "eigen", "freestanding"],
+    "filter/ekf/gate.h": ["freestanding"],
+    "filter/ekf/records.h": ["include/ear/", "eigen", "freestanding"],
+    "filter/sources/": [*SOURCES, *BELOW_SOURCES, "filter/advice.h"],
+    "filter/sources/cameras/": ["filter/sources/cameras/", "filter/sources/cameras/frame_agreement.h", *BELOW_SOURCES],
+    "filter/sources/cameras/frame_agreement.h": ["eigen"],
+    "filter/sources/wheels/": ["filter/sources/wheels/", *BELOW_SOURCES],
+    "filter/sources/ground/": ["filter/sources/ground/", *BELOW_SOURCES],
+    "filter/sources/standstill/": ["filter/sources/standstill/", *BELOW_SOURCES],
+    "filter/start/": ["filter/start/", *SOURCES, *BELOW_SOURCES, "filter/advice.h"],
+    "filter/health/": ["filter/health/", "filter/ingest/", *RECORDS, "filter/advice.h", "include/ear/", "eigen", "freestanding"],
+    "smoother/": ["smoother/", *FILTER, "include/ear/", "eigen", "ceres", "freestanding"],
     "frontend/": ["frontend/", "include/ear/", "eigen", "opencv", *STANDARD],
-    "src/": ["src/", "src/log/", "filter/", "frontend/", "include/ear/", "eigen", "opencv", *STANDARD],
+    "src/": ["src/", "src/log/", *FILTER, "frontend/", "include/ear/", "eigen", "opencv", *STANDARD],
     "src/log/": ["src/log/", "include/ear/", "spdlog", *STANDARD],
     "src/recording/": ["src/recording/", "src/log/", "include/ear/", "eigen", "opencv", "yaml-cpp", "json", *STANDARD],
     "src/bag/": ["src/bag/", "src/recording/", "include/ear/", "eigen", "ros", "yaml-cpp", *STANDARD],
-    "src/mavlink/": ["src/mavlink/", "filter/", "include/ear/", "eigen", "posix", *STANDARD],
+    "src/mavlink/": ["src/mavlink/", *FILTER, "include/ear/", "eigen", "posix", *STANDARD],
     # Simulated truth shares no code with the models, and an evaluation does not know what made the estimate.
     "tools/simulator/": ["tools/simulator/", "include/ear/", "eigen", "opencv", *STANDARD],
     "tools/evaluation/": ["tools/evaluation/", "include/ear/", "eigen", "json", *STANDARD],
@@ -27,9 +48,9 @@ LAYERS = {
 EVERYTHING = [*LAYERS, "eigen", "opencv", "yaml-cpp", "json", "spdlog", "posix", "ceres", *STANDARD]
 LAYERS["tools/"] = ["tools/", "cli11", *EVERYTHING]
 LAYERS["tests/"] = ["tests/", "tools/", "doctest", *EVERYTHING]
-LAYERS["tests/tools/consumer/"] = ["include/ear/", "filter/", *STANDARD]
+LAYERS["tests/tools/consumer/"] = ["include/ear/", *FILTER, *STANDARD]
 LAYERS["examples/c/"] = ["include/ear/", "posix", *STANDARD]
-LAYERS["examples/filter_only/"] = ["include/ear/", "filter/", "eigen", *STANDARD]
+LAYERS["examples/filter_only/"] = ["include/ear/", *FILTER, "eigen", *STANDARD]
 
 # Files, output, clocks and threads: the filter would build for a microcontroller.
 HOSTED = ["atomic", "chrono", "condition_variable", "cstdio", "ctime", "filesystem", "fstream", "future", "iostream",

@@ -1,4 +1,4 @@
-#include <filter/state.h>
+#include <filter/ekf/state.h>
 
 #include <cstdlib>
 
