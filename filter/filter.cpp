@@ -74,13 +74,15 @@ void Filter::propagate_to(const FeatureFrame& frame) {
   consistency_ = Consistency{};
   records_ = records_for(frame, records_, sources_.on_ground());
   sources_.look_at(frame, t_ns, ingest_, ekf_);
-  if (!ekf_.running()) {
-    start(frame, t_ns);
-    return;
+  if (ekf_.running()) {
+    consistency_ = consistency_check_(sources_.displacements(frame, t_ns, ingest_, ekf_));
+    sources_.advance(t_ns, advise(consistency_, health_.health(), config_.anomaly), ingest_, ekf_, records_);
   }
-  consistency_ = consistency_check_(sources_.displacements(frame, t_ns, ingest_, ekf_));
-  sources_.advance(t_ns, advise(consistency_, health_.health(), config_.anomaly), ingest_, ekf_, records_);
-  start_again(frame);
+  if (!ekf_.running() || health_.lost()) {
+    start(frame);
+  } else {
+    start_.forget_frames();
+  }
 }
 
 /// A bias that jumped is as little known as at the start, and took the motion along until it was found out.
@@ -115,31 +117,20 @@ std::optional<Estimate> Filter::report(bool image, const FrameAgreement& agreeme
 
 // ---- Starts
 
-void Filter::start(const FeatureFrame& frame, TimeNs t_ns) {
-  const ImuStatistics recent = sources_.standstill().recent(ingest_.imu(), t_ns);
-  const bool restarts = without_state_ == Status::lost;
-  if (!restarts) without_state_ = recent.count < 2 ? Status::waiting_for_imu : Status::waiting_for_standstill;
-  const Start::Situation now{
-      frame, t_ns, sources_.standstill().stands(), sources_.on_ground(), restarts, ekf_.state().camera};
-  const std::optional<StartState> found = start_.find(now, recent, ingest_);
-  if (!found) return;
-  const Advice advice = advise(consistency_, health_.health(), config_.anomaly);
-  alignment_ = start_.begin(*found, last_good_, advice, ingest_, ekf_, sources_, records_);
-  sources_.advance(t_ns, advice, ingest_, ekf_, records_);
-}
-
 /// While lost, the state goes on, and is good again if the cameras come to agree with it. Where they do not, but agree
 /// with the inertial samples, it is the state that is wrong, and begins anew.
-void Filter::start_again(const FeatureFrame& frame) {
-  if (!health_.lost()) {
-    start_.forget_frames();
-    return;
-  }
+void Filter::start(const FeatureFrame& frame) {
+  const bool lost = ekf_.running();
   const CameraState given = camera_state(calibration_);  // what was learned may be as wrong as the rest
-  const Start::Situation now{frame, imu_time(frame.t_ns, given), false, false, true, given};
-  const std::optional<StartState> found = start_.find_in_motion(now, ingest_, health_.contradicted());
+  const TimeNs t_ns = imu_time(frame.t_ns, given);
+  const ImuStatistics recent = sources_.standstill().recent(ingest_.imu(), t_ns);
+  const bool restarts = lost || without_state_ == Status::lost;
+  if (!restarts) without_state_ = recent.count < 2 ? Status::waiting_for_imu : Status::waiting_for_standstill;
+  const Start::Situation now{frame, t_ns, sources_.standstill().stands(), sources_.on_ground(), restarts, given};
+  const std::optional<StartState> found =
+      lost ? start_.find_in_motion(now, ingest_, health_.contradicted()) : start_.find(now, recent, ingest_);
   if (!found) return;
-  stop();
+  if (lost) stop();
   const Advice advice = advise(consistency_, health_.health(), config_.anomaly);
   alignment_ = start_.begin(*found, last_good_, advice, ingest_, ekf_, sources_, records_);
   sources_.advance(imu_time(frame.t_ns, ekf_.state().camera), advice, ingest_, ekf_, records_);

@@ -77,8 +77,7 @@ class Filter final : public Estimator {
  private:
   void propagate_to(const FeatureFrame& frame);
   void watch_biases();
-  void start(const FeatureFrame& frame, TimeNs t_ns);
-  void start_again(const FeatureFrame& frame);
+  void start(const FeatureFrame& frame);
   void stop();
   void restart(TimeNs t_ns, TimeNs clock_shift);
   void take_imu();

@@ -21,7 +21,7 @@ class Covariance {
 
   /// The inertial part moves on; all else stays where it is in the world. So does the ground's normal, whose error is
   /// counted from that of the body's rotation; `B`: its tangent basis. `normal_variance` [rad^2]: what the ground may
-  /// have turned meanwhile, each way.
+  /// have turned meanwhile, each axis.
   void propagate(const ErrorTransition& transition, const Eigen::Matrix<double, 3, 2>& B, double normal_variance);
 
   /// Makes the `sigma.size()` entries from `first` on unknown anew: these standard deviations, no correlations.

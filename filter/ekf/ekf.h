@@ -46,7 +46,7 @@ class Ekf {
   [[nodiscard]] bool running() const { return running_; }
   [[nodiscard]] std::optional<TimeNs> time() const { return running_ ? std::optional(state_.imu.t_ns) : std::nullopt; }
 
-  /// How the samples on the way are to be taken.
+  /// How the samples up to there are to be taken.
   struct Propagation {
     double weight = 1.0;                ///< (15): the noise of the accelerometer is divided by it
     std::optional<TimeNs> gap_from_ns;  ///< from there on samples are missing

@@ -1,4 +1,4 @@
-// IMU integration and how it carries the error along. Derivation: docs/filter.md, section 2.
+// IMU integration and how it carries the error along. Derivation: docs/filter.md, "Propagation".
 #pragma once
 
 #include <Eigen/Core>
@@ -42,7 +42,7 @@ struct BodyMotion {
 /// The state as users get it.
 [[nodiscard]] NavState nav_state(const ImuState& x);
 
-/// How the error of `x` goes over into that of integrate(x, ...), and the noise that comes in on the way.
+/// How the error of `x` goes over into that of integrate(x, ...), and the noise that comes in meanwhile.
 [[nodiscard]] ErrorTransition error_transition(const ImuState& x, const Eigen::Vector3d& gyro_B,
                                                const Eigen::Vector3d& accel_B, double dt, const ImuCalibration& noise);
 

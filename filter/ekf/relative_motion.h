@@ -1,5 +1,5 @@
 // How the body moved since a clone, as one measurement of the whole pose: where it stands still, and where the images
-// of two frames tell it by themselves. docs/filter.md, sections 4 and 15.
+// of two frames show it by themselves. docs/filter.md, "Standing", "Gaps and jumps".
 #pragma once
 
 #include <Eigen/Core>

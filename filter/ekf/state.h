@@ -1,4 +1,5 @@
-// The state, and what an error of it means. Only boxplus and boxminus know the error's definition (docs/filter.md, 1):
+// The state, and what an error of it means. Only boxplus and boxminus know the error's definition (docs/filter.md,
+// "State and error"):
 //   R = Exp(theta) R^, v = Exp(theta) v^ + nu, p = Exp(theta) p^ + rho; clones alike; n = Exp(theta) Exp(B delta) n^;
 //   biases and calibration additive, wheels relative, rotations of the cameras R = Exp(phi) R^, of the odometer
 //   R = R^ Exp(phi).

@@ -1,6 +1,6 @@
 // Did the bias of the gyroscope or of the accelerometer jump? Sound biases walk slowly, and each update corrects them
-// about as much as it lowers their variance. Corrections that add up to more than these variances allow tell of a bias
-// that is elsewhere. docs/filter.md, section 15.
+// about as much as it lowers their variance. Corrections that add up to more than these variances allow show a bias
+// that is elsewhere. docs/filter.md, "Gaps and jumps".
 #pragma once
 
 #include "ear/types.h"
@@ -18,7 +18,7 @@ struct BiasJump {
 class BiasWatch {
  public:
   /// What all updates since the last call did, the state now being at `t_ns`. What speaks for a jump is forgotten when
-  /// it was reported. Updates by images are believed sooner: wheels that leave the ground unnoticed mislead.
+  /// it was reported. Updates by images count sooner: wheels that leave the ground unnoticed mislead.
   BiasJump judge(const BiasChanges& changes, TimeNs t_ns);
 
  private:

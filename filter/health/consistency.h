@@ -1,5 +1,5 @@
 // Do IMU, odometer and camera agree about how far the body went between two frames? If not, who is at fault, and how
-// much is it to be trusted? The paper's III-D, (13)-(15); docs/anomaly.md.
+// much is it to count? The paper's III-D, (13)-(15); docs/anomaly.md.
 #pragma once
 
 #include "ear/estimate.h"
@@ -13,7 +13,7 @@ class ConsistencyCheck {
  public:
   explicit ConsistencyCheck(const AnomalyConfig& config);
 
-  /// Weights are 1 except for the sensor at fault, and 0 where there is no displacement. It takes three to tell who is
+  /// Weights are 1 except for the sensor at fault, and 0 where there is no displacement. It takes three to show who is
   /// at fault; two that disagree keep their weights. A sensor that contradicts itself is at fault in any case.
   [[nodiscard]] Consistency operator()(const Displacements& displacements) const;
 

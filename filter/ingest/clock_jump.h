@@ -1,4 +1,4 @@
-// What counts as a jump of a sensor's clock, for all of them. docs/filter.md, section 14.
+// What counts as a jump of a sensor's clock, for all of them. docs/ingest.md.
 #pragma once
 
 #include <cmath>

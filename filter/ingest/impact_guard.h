@@ -1,5 +1,5 @@
 // By how much an inertial sample is less certain than usual: a landing's strike, a spike, a clipped value.
-// docs/filter.md, section 12.
+// docs/ingest.md.
 #pragma once
 
 #include <Eigen/Core>

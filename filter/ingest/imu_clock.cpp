@@ -25,8 +25,8 @@ ImuClock::ImuClock() : samples_(kCapacity) {}
 
 bool ImuClock::jumps(double step) const { return interval_ > 0.0 && is_clock_jump(step - interval_); }
 
-/// Can the other sensors tell whose jump it is? Not if they measured meanwhile what the samples leave out.
-bool ImuClock::others_tell(double step) const {
+/// Can the other sensors show whose jump it is? Not if they measured meanwhile what the samples leave out.
+bool ImuClock::others_show(double step) const {
   bool any = false;
   for (const Other& other : others_) {
     if (!other.before_ns) continue;
@@ -61,7 +61,7 @@ void ImuClock::add(const ImuSample& sample) {
     if (!follows || long_enough) settle(false);
   } else if (last_ns_) {
     const double step = seconds_between(*last_ns_, sample.t_ns);
-    if (jumps(step) && others_tell(step)) {
+    if (jumps(step) && others_show(step)) {
       waiting_ = true;
       jump_ = step - interval_;
       votes_ = 0;

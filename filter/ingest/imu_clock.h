@@ -1,6 +1,6 @@
 // Whose clock is it that jumps? Where the stamps of the inertial samples jump and those of the other sensors, as they
 // come in, do not, it is the inertial clock's fault: its stamps are moved back onto the common clock. Where the others
-// jump as well, or went on meanwhile, samples are missing, or time is another for all. docs/filter.md, section 14.
+// jump as well, or went on meanwhile, samples are missing, or time is another for all. docs/ingest.md.
 #pragma once
 
 #include <array>
@@ -19,7 +19,7 @@ class ImuClock {
   ImuClock();
 
   /// A sample as its driver stamped it, in the order of arrival. After a jump samples wait until the other sensors have
-  /// told whose it is, for a quarter of a second at most.
+  /// shown whose it is, for a quarter of a second at most.
   void add(const ImuSample& sample);
   /// Another sensor's reading came in.
   void observe(Stream stream, TimeNs stamp_ns);
@@ -46,7 +46,7 @@ class ImuClock {
   };
 
   [[nodiscard]] bool jumps(double step) const;
-  [[nodiscard]] bool others_tell(double step) const;
+  [[nodiscard]] bool others_show(double step) const;
   void follow(TimeNs driver_ns);
   void settle(bool own_clock);
   void review(Other& other, TimeNs stamp_ns);

@@ -1,5 +1,5 @@
 // Samples in: one clock a stream, plausibility, buffers, and the quality of the inertial samples. What comes out can be
-// used. A sample that is late, early, false or missing is dealt with here. docs/filter.md, "What is refused".
+// used. A sample that is late, early, false or missing is dealt with here. docs/ingest.md.
 #pragma once
 
 #include <optional>

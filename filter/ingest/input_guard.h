@@ -1,5 +1,4 @@
-// Whether a sample can be true, before anything is done with it; what cannot is refused and counted. docs/filter.md,
-// section 14.
+// Whether a sample can be true, before anything is done with it; what cannot is refused and counted. docs/ingest.md.
 #pragma once
 
 #include <cstdint>

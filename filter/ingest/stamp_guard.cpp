@@ -5,7 +5,7 @@ namespace {
 
 constexpr double kLongestStep = 0.25;  // [s] ahead that needs no confirmation
 constexpr int kConfirmed = 3;          // stamps in a row after a longer one
-constexpr double kSetBack = 1.0;       // [s] of stamps in a row before a clock that runs behind is believed
+constexpr double kSetBack = 1.0;       // [s] of stamps in a row before a clock that runs behind is accepted
 
 }  // namespace
 

@@ -1,4 +1,4 @@
-// Whether a stamp is to be believed. One false stamp must not shut out the samples that follow it.
+// Whether a stamp can be used. One false stamp must not shut out the samples that follow it.
 #pragma once
 
 #include <cstdint>
@@ -30,7 +30,7 @@ class StampGuard {
 
  private:
   bool any_ = false;
-  TimeNs last_ns_ = 0;      ///< of those believed
+  TimeNs last_ns_ = 0;      ///< of those accepted
   TimeNs run_from_ns_ = 0;  ///< stamps in a row that follow each other, but not last_ns_: the first
   TimeNs run_to_ns_ = 0;    ///< and the last
   int run_ = 0;             ///< how many

@@ -11,7 +11,7 @@ namespace {
 constexpr int kToKnow = 20;        // readings until it is known how they usually come
 constexpr double kMemory = 100.0;  // readings
 constexpr double kShare = 0.5;     // of a jump, that its two measures may differ by
-constexpr double kPause = 5.0;     // intervals; after longer ones steps tell nothing
+constexpr double kPause = 5.0;     // intervals; after longer ones steps show nothing
 
 }  // namespace
 

@@ -1,6 +1,6 @@
 // The clock of a sensor beside the inertial one. Where its stamps jump, and its readings do not come in otherwise than
 // before, the jump is taken out. Readings that come late keep their steps, those that are missing leave their time out
-// in both: neither is a jump. docs/filter.md, section 14.
+// in both: neither is a jump. docs/ingest.md.
 #pragma once
 
 #include <optional>
@@ -11,7 +11,7 @@ namespace ear {
 
 class StreamClock {
  public:
-  /// The stamp of a reading by the common clock, `now_ns` being the newest inertial sample, if that tells the time.
+  /// The stamp of a reading by the common clock, `now_ns` being the newest inertial sample, if that gives the time.
   /// Nothing for the first one after a jump, which may have a false stamp of its own.
   [[nodiscard]] std::optional<TimeNs> correct(TimeNs stamp_ns, std::optional<TimeNs> now_ns);
 

@@ -33,7 +33,7 @@ NavState MapAlignment::to_world(const NavState& state_A) const {
   return state;
 }
 
-/// A yaw error e of the alignment turns the vehicle, its velocity, and its way since the start, about z.
+/// A yaw error e of the alignment turns the vehicle, its velocity, and its path since the start, about z.
 Eigen::Matrix<double, estimate_error::size, estimate_error::size> MapAlignment::to_world(
     const Eigen::Matrix<double, estimate_error::size, estimate_error::size>& covariance_A,
     const NavState& state_A) const {

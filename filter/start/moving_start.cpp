@@ -13,8 +13,8 @@ namespace {
 constexpr double kSpan = 1.5;  // [s] of frames that it takes
 constexpr std::size_t kFewestFrames = 8;
 constexpr double kLongestStep = 0.35;    // [s] between two frames
-constexpr double kScaleSigma = 0.02;     // of a way: noise of the disparities makes points too near or too far
-constexpr double kWaySigma = 1e-3;       // [m]
+constexpr double kScaleSigma = 0.02;     // of a path: noise of the disparities makes points too near or too far
+constexpr double kPathSigma = 1e-3;      // [m]
 constexpr double kAccelSigma = 0.3;      // [m/s^2] what a poor accelerometer may be off between two frames
 constexpr double kRotationSigma = 2e-3;  // [rad] of a rotation from the cameras
 constexpr double kWorstGravity = 0.7;    // [m/s^2] by which the cameras alone may miss it
@@ -44,7 +44,7 @@ struct Sums {
   }
 };
 
-/// The same image twice: no two exposures are exactly equal, and nothing says how the vehicle moves.
+/// The same image twice: no two exposures are exactly equal, and nothing shows how the vehicle moves.
 bool frozen(const std::vector<StereoMatch>& matches) {
   return std::all_of(matches.begin(), matches.end(), [](const StereoMatch& m) { return m.left0 == m.left1; });
 }
@@ -131,9 +131,10 @@ std::optional<ImuState> MovingStart::solve(const ImuBuffer& imu) const {
     H.middleCols<3>(kG) = 0.5 * (t1 * t1 - t0 * t0) * Eigen::Matrix3d::Identity();
     H.middleCols<3>(kBa) = sums.position_by_b_a - before.position_by_b_a;
     const Eigen::Vector3d z = before.R * motion.p_B0B1 - (sums.position - before.position);
-    const double way = kScaleSigma * motion.p_B0B1.norm();
+    const double scale = kScaleSigma * motion.p_B0B1.norm();
     const double unsteady = kAccelSigma * (t1 - t0) * (t1 - t0);
-    const double variance = motion.covariance.trace() / 3.0 + kWaySigma * kWaySigma + way * way + unsteady * unsteady;
+    const double variance =
+        motion.covariance.trace() / 3.0 + kPathSigma * kPathSigma + scale * scale + unsteady * unsteady;
     A += H.transpose() * H / variance;
     b += H.transpose() * z / variance;
     cost += z.squaredNorm() / variance;

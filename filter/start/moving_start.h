@@ -1,5 +1,5 @@
 // Where a filter may begin in a vehicle that moves, in the air or without wheels: velocity, gravity and biases that
-// explain what two cameras and the inertial samples saw over the last second or two. docs/filter.md, section 13.
+// explain what two cameras and the inertial samples saw over the last second or two. docs/filter.md, "Starts".
 #pragma once
 
 #include <optional>
@@ -30,7 +30,7 @@ class MovingStart {
     StereoMotion motion;  ///< from the frame before; unused for the first
   };
 
-  /// The next frame, at IMU time `t_ns`. Where its motion cannot be told, what came before is forgotten.
+  /// The next frame, at IMU time `t_ns`. Where its motion is not known, what came before is forgotten.
   void add(TimeNs t_ns, const FeatureFrame& frame, const ImuBuffer& imu, const CameraState& cameras);
 
   /// A state at the first frame kept; nothing while the frames span too little, or contradict the inertial samples.
@@ -39,7 +39,7 @@ class MovingStart {
   /// It is a point to linearize at, not an estimate: the frames may be used again.
   [[nodiscard]] std::optional<ImuState> solve(const ImuBuffer& imu) const;
 
-  /// The way from the last frame to IMU time `t_ns`, in the body as it was then, at the speed before. Nothing before
+  /// The path from the last frame to IMU time `t_ns`, in the body as it was then, at the speed before. Nothing before
   /// two frames.
   [[nodiscard]] std::optional<Eigen::Vector3d> path_to(TimeNs t_ns) const;
 

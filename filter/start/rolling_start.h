@@ -1,5 +1,5 @@
 // Where a filter may begin on a vehicle that already rolls: attitude, velocity and biases that explain what gyroscope,
-// accelerometer and wheels read over the last second or two. docs/filter.md, section 9.
+// accelerometer and wheels read over the last second or two. docs/filter.md, "Starts".
 #pragma once
 
 #include <optional>
@@ -11,7 +11,7 @@
 
 namespace ear {
 
-/// Standard deviations of what is not known before, and of what the wheels tell.
+/// Standard deviations of what is not known before, and of what the wheels measure.
 struct RollingStartNoise {
   double gyro_bias = 0.1;    ///< [rad/s]
   double accel_bias = 0.05;  ///< [m/s^2]
@@ -19,7 +19,8 @@ struct RollingStartNoise {
 
 /// A state at the start of the first of `turns`. Least squares over the velocity v and gravity g of that moment, in the
 /// body as it then was (B), and the biases:
-///   R_Bk u_k = v + g t_k + integral of R f,      u_k: the body's velocity that the wheels tell, along the odometer's x
+///   R_Bk u_k = v + g t_k + integral of R f,      u_k: the body's velocity that the wheels measure, along the
+///   odometer's x
 /// It is a point to linearize at, not an estimate: the samples may be used again. Nothing if the turns have gaps, span
 /// less than `min_duration` [s], or contradict the inertial samples, as they do in the air or on slipping wheels.
 [[nodiscard]] std::optional<ImuState> rolling_start(const ImuBuffer& imu, const Ring<WheelIncrement>& turns,

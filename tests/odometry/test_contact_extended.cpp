@@ -1,4 +1,4 @@
-// Contact on all sequences, as they are and with one beam that fails. docs/filter.md, section 11, has the figures.
+// Contact on all sequences, as they are and with one beam that fails. docs/filter.md, "Contact", has the figures.
 #include <doctest/doctest.h>
 
 #include "tests/support/contact_run.h"

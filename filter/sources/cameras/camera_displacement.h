@@ -1,4 +1,4 @@
-// How far the body went between two frames, as the stereo features seen in both tell: the rotation is the gyroscope's,
+// How far the body went between two frames, by the stereo features seen in both: the rotation is the gyroscope's,
 // the translation a robust least-squares fit to points triangulated in each frame. docs/anomaly.md.
 #pragma once
 

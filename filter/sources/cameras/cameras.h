@@ -61,8 +61,8 @@ class Cameras {
   /// The frame was used; the next one is compared with it.
   void remember(const FeatureFrame& frame, const Ekf& ekf);
   [[nodiscard]] const std::optional<LastImage>& last_image() const { return last_; }
-  /// Where the body was at the last image, by all that was measured since: what wheels and lasers measure until the next
-  /// image corrects clone and state alike, and is no motion. There must be an image.
+  /// Where the body was at the last image, by all that was measured since: what wheels and lasers measure until the
+  /// next image corrects clone and state alike, and is no motion. There must be an image.
   [[nodiscard]] Pose image_pose(const State& x) const;
 
   /// The state begins anew.

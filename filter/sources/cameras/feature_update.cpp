@@ -15,7 +15,7 @@ constexpr int clone_column(int clone) { return err::clone(clone) - err::camera; 
 
 /// The rows of which A = H^T H and b = H^T r are the sums: Cholesky with diagonal pivoting, row by row. A, of which
 /// only the lower triangle is read, is singular (yaw and position are free, calibration is seen in part). The largest
-/// pivot against `scale` comes first, so that rounding does not grow; one lost in rounding says nothing, and ends it.
+/// pivot against `scale` comes first, so that rounding does not grow; one lost in rounding adds nothing, and ends it.
 /// Without the pivoting rounding makes up rows, and once in some ten thousand frames one that moves the estimate by ten
 /// sigmas. b is overwritten; `pivots` is scratch.
 void rows_from_sums(const Eigen::Ref<const Eigen::MatrixXd>& A, Eigen::Ref<Eigen::VectorXd> b,

@@ -1,4 +1,5 @@
-// What one tracked feature says about the window, with the feature itself eliminated. Derivation: docs/filter.md, 3.
+// What one tracked feature shows of the window, with the feature itself eliminated. Derivation: docs/filter.md,
+// "Features".
 #pragma once
 
 #include <Eigen/Core>
@@ -65,8 +66,8 @@ class FeatureInformation {
   static constexpr double kRounding = 1e-11;
 
   /// Rows equivalent to all features added: residual = H e + n, cov(n) = I. Empty if there were none. Valid until
-  /// start(). `negligible`: the share of what the features tell of a quantity, were they known themselves, that need
-  /// not be told; smaller ones come last.
+  /// start(). `negligible`: the share of what the features show of a quantity, were they known themselves, that may
+  /// be left out; smaller ones come last.
   void compress(double negligible = kRounding);
   [[nodiscard]] Eigen::Ref<const Eigen::MatrixXd> H() const { return rows_.H.topLeftCorner(rows_.count, size_); }
   [[nodiscard]] Eigen::Ref<const Eigen::VectorXd> residual() const { return rows_.r.head(rows_.count); }

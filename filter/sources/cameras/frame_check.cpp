@@ -10,10 +10,10 @@
 namespace ear {
 namespace {
 
-constexpr std::size_t kFewest = 8;    // features in common, for anything to be said
-constexpr double kLooser = 4.0;       // a wrong way must not look like a turn: it may be wrong by more than it should
-constexpr double kLeastWay = 1e-5;    // [m]
-constexpr double kLeastDepth = 1e-3;  // of a scaled point: smaller is beside or behind the camera
+constexpr std::size_t kFewest = 8;  // features in common, for any result
+constexpr double kLooser = 4.0;  // a wrong distance must not look like a turn: it may be wrong by more than it should
+constexpr double kLeastMotion = 1e-5;  // [m]
+constexpr double kLeastDepth = 1e-3;   // of a scaled point: smaller is beside or behind the camera
 
 /// Standard deviation of an inverse depth by stereo [1/m]. `sigma`: of one observation, normalized.
 double inverse_depth_sigma(double sigma, const CameraState& cameras) {
@@ -47,16 +47,16 @@ FrameAgreement FrameCheck::compare(const FeatureFrame& from, const FeatureFrame&
   const Pose& T_BC0 = cameras.T_BC0;
   const Pose T_BC1 = {T_BC0.R * cameras.T_C0C1.R, T_BC0.R * cameras.T_C0C1.p + T_BC0.p};
   const double sigma_s = inverse_depth_sigma(sigma, cameras);
-  const double way = motion.p_B0B1.norm();
+  const double distance = motion.p_B0B1.norm();
   int off_left = 0, off_right = 0, seen_right = 0;
-  // Of a turn and a way beyond the predicted ones, least squares; the way is known to some sigma_p.
+  // Of a turn and a displacement beyond the predicted ones, least squares; the latter is known to some sigma_p.
   Eigen::Matrix<double, 6, 6> A = Eigen::Matrix<double, 6, 6>::Zero();
   Eigen::Matrix<double, 6, 1> b = Eigen::Matrix<double, 6, 1>::Zero();
   for (const StereoMatch& match : matches) {
     const double s = stereo_inverse_depth(cameras, match.left0, match.right0);
-    // Noise of this observation and of the one that it starts from; of the depth, whose error the way makes visible;
-    // of the way itself.
-    const double noise_variance = 2.0 * sigma * sigma + std::pow(way * sigma_s, 2);
+    // Noise of this observation and of the one that it starts from; of the depth, whose error the motion makes visible;
+    // of the motion itself.
+    const double noise_variance = 2.0 * sigma * sigma + std::pow(distance * sigma_s, 2);
     const double variance = noise_variance + std::pow(s * motion.sigma_p, 2);
     const Eigen::Vector3d g = T_BC0.R * match.left0.homogeneous() + s * T_BC0.p;
     const Eigen::Vector3d moved = motion.R_B0B1.transpose() * (g - s * motion.p_B0B1);
@@ -85,10 +85,10 @@ FrameAgreement FrameCheck::compare(const FeatureFrame& from, const FeatureFrame&
   }
   result.left = share(off_left, result.matches);
   result.right = share(off_right, seen_right);
-  const double sigma_way = std::max(kLooser * motion.sigma_p, kLeastWay);
-  A.diagonal().tail<3>().array() += 1.0 / (sigma_way * sigma_way);
-  const Eigen::LLT<Eigen::Matrix3d> way_llt(A.bottomRightCorner<3, 3>());
-  const Eigen::Matrix3d gain = way_llt.solve(A.bottomLeftCorner<3, 3>()).transpose();
+  const double sigma_p = std::max(kLooser * motion.sigma_p, kLeastMotion);
+  A.diagonal().tail<3>().array() += 1.0 / (sigma_p * sigma_p);
+  const Eigen::LLT<Eigen::Matrix3d> p_llt(A.bottomRightCorner<3, 3>());
+  const Eigen::Matrix3d gain = p_llt.solve(A.bottomLeftCorner<3, 3>()).transpose();
   const Eigen::Matrix3d of_turn = A.topLeftCorner<3, 3>() - gain * A.bottomLeftCorner<3, 3>();
   const double least = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(of_turn).eigenvalues()(0);
   if (least > 1.0) {

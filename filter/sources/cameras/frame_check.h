@@ -1,5 +1,5 @@
 // Do two frames in a row agree with how the vehicle is thought to have moved between them? Unlike the filter's gates,
-// which see a feature when its track ends, this tells at once. docs/health.md.
+// which see a feature when its track ends, this shows at once. docs/health.md.
 #pragma once
 
 #include <Eigen/Core>

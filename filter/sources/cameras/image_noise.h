@@ -1,5 +1,5 @@
 // How exact are the features of a frame? What both cameras see must lie on a line, wherever the point and the vehicle
-// are: how far it does not is noise. In poor light it is more than usual. docs/filter.md, section 16.
+// are: how far it does not is noise. In poor light it is more than usual. docs/filter.md, "Poor light".
 #pragma once
 
 #include <vector>

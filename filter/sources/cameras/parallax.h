@@ -1,4 +1,4 @@
-// How far features moved from one frame to another beyond what the rotation alone does: what tells keyframes.
+// How far features moved from one frame to another beyond what the rotation alone does: what makes keyframes.
 #pragma once
 
 #include <Eigen/Core>

@@ -50,7 +50,7 @@ class Problem {
   NormalEquations step(const StereoMotion& x, int& fitting) const {
     NormalEquations sums;
     fitting = 0;
-    // A depth's error moves the point in frame 1 by its parallax, which is in proportion to the way.
+    // A depth's error moves the point in frame 1 by its parallax, which is in proportion to the motion.
     const double share = std::sqrt(2.0) * x.p_B0B1.norm() / baseline_;
     const double sigma = sigma_ * std::sqrt(1.0 + share * share);
     for (const StereoMatch& match : matches_) {
@@ -74,7 +74,7 @@ class Problem {
     J_h << 1.0, 0.0, -predicted.x(), 0.0, 1.0, -predicted.y();
     J_h /= h.z();
     const Eigen::Matrix<double, 2, 3> J = J_h * T_BC.R.transpose();
-    Eigen::Matrix<double, 2, 6> H;  // R_B0B1 Exp(theta): moved turns the other way
+    Eigen::Matrix<double, 2, 6> H;  // R_B0B1 Exp(theta): moved turns against it
     H.leftCols<3>() = J * skew(moved);
     H.rightCols<3>() = -point.s * J * x.R_B0B1.transpose();
     const Eigen::Vector2d r = uv - predicted;

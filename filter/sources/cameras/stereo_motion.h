@@ -1,5 +1,5 @@
 // How the body moved between two frames, from the features that both cameras saw in the first: no filter, no window.
-// docs/filter.md, section 13.
+// docs/filter.md, "Starts".
 #pragma once
 
 #include <Eigen/Core>
@@ -47,7 +47,7 @@ struct StereoMotion {
 
 /// Least squares over rotation and translation: the points seen in frame 0, projected into both cameras of frame 1.
 /// Observations further off than `huber` standard deviations weigh less. `sigma`: one observation, normalized; `start`:
-/// where to begin. Nothing if the points do not tell, or most of them do not move as one body.
+/// where to begin. Nothing if the points do not show it, or most of them do not move as one body.
 [[nodiscard]] std::optional<StereoMotion> stereo_motion(const std::vector<StereoMatch>& matches,
                                                         const CameraState& cameras, const StereoMotion& start,
                                                         double sigma);

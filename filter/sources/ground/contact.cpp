@@ -10,7 +10,7 @@ constexpr double kGravity = 9.81;       // [m/s^2]
 constexpr double kFreeFall = 3.0;       // [m/s^2] less specific force than this, and nothing carries the vehicle
 constexpr double kFallDuration = 0.04;  // [s]
 constexpr double kConfirmation = 0.1;   // [s] for which a strike or driven wheels confirm
-constexpr double kJustNow = 0.3;        // [s] the way rolled in this time counts for the tolerance
+constexpr double kJustNow = 0.3;        // [s] the distance rolled in this time counts for the tolerance
 constexpr double kFullWay = 0.2;        // [m] of it, and the ground may be as uneven as it gets
 constexpr double kLevelSigma = 0.02;    // [m] of the wheels' height over the plane, on the ground
 constexpr double kLevelWay = 0.2;   // [m] over which this height changes; the sight of it is renewed ten times as often
@@ -18,7 +18,7 @@ constexpr double kLevelTime = 2.0;  // [s] the same for a vehicle at rest
 constexpr double kLongestStep = 0.1;    // [s] between inertial samples
 constexpr double kAirSpeed = 1.0;       // [m/s] at which the ground passes below a flying vehicle
 constexpr double kFirstDuration = 0.1;  // [s] of evidence for the first mode
-constexpr double kSilence = 0.3;        // [s] without a reading that agrees, and the beams say nothing
+constexpr double kSilence = 0.3;        // [s] without a reading that agrees, and the beams show nothing
 constexpr double kHeightKnown = 0.05;   // [m]
 constexpr double kNormalKnown = 0.087;  // [rad]
 
@@ -112,8 +112,8 @@ void ContactDetector::roll(const WheelWatch::Motion& motion) {
 
 /// How far the wheels may seem to be above `level_` without being in the air.
 double ContactDetector::tolerance(bool all_agree) const {
-  const double doubt = all_agree ? std::min(1.0, recent_way_ / kFullWay) : 1.0;
-  return config_.takeoff_height + config_.unevenness * doubt;
+  const double unknown = all_agree ? std::min(1.0, recent_way_ / kFullWay) : 1.0;
+  return config_.takeoff_height + config_.unevenness * unknown;
 }
 
 ContactEvent ContactDetector::look_for_first_evidence(TimeNs t_ns) {
@@ -121,7 +121,7 @@ ContactEvent ContactDetector::look_for_first_evidence(TimeNs t_ns) {
   return change(ground_->height() < config_.confirmed_height ? ContactMode::ground : ContactMode::air, t_ns);
 }
 
-/// Every beam that is believed must see the ground below the wheels, and there must be two (one, where there is but
+/// Every beam in use must see the ground below the wheels, and there must be two (one, where there is but
 /// one).
 ContactEvent ContactDetector::look_for_takeoff(const GroundTracker::Sighting& sighting, TimeNs t_ns) {
   const double lowest = ground_->height() - 2.0 * ground_->height_sigma();
@@ -141,7 +141,7 @@ ContactEvent ContactDetector::look_for_touchdown(TimeNs t_ns) {
   return look_for_confirmed_touchdown(t_ns);
 }
 
-/// Something struck the vehicle, or drives its wheels, while it is low. Where the beams say nothing it takes both.
+/// Something struck the vehicle, or drives its wheels, while it is low. Where the beams show nothing it takes both.
 ContactEvent ContactDetector::look_for_confirmed_touchdown(TimeNs t_ns) {
   if (mode_ != ContactMode::air) return ContactEvent::none;
   const auto just_now = [&](TimeNs what_ns) {  // and not before the vehicle left the ground

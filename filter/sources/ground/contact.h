@@ -1,6 +1,6 @@
 // Does the vehicle stand or roll on the ground, or does it fly? The beams decide: contact is when the plane they hit
 // passes the wheel radius below the axle. A strike or wheels that are spun up from below only make the decision faster.
-// docs/filter.md, section 11.
+// docs/filter.md, "Contact".
 #pragma once
 
 #include <Eigen/Core>
@@ -30,7 +30,7 @@ class ContactDetector {
  public:
   ContactDetector(const ContactConfig& config, const Calibration& calibration);
 
-  /// Each says whether the mode has just changed. The first mode after `unknown` is no event.
+  /// Each returns whether the mode has just changed. The first mode after `unknown` is no event.
   ContactEvent add_imu(const ImuSample& sample);
   ContactEvent add_encoder(const EncoderSample& sample);
   ContactEvent add_laser(const LaserSample& sample);
@@ -45,9 +45,9 @@ class ContactDetector {
   [[nodiscard]] std::bitset<kMaxBeams> stuck_beams() const {
     return ground_ ? ground_->stuck_beams() : std::bitset<kMaxBeams>{};
   }
-  /// Height of the wheels above the ground's plane [m], if the beams tell it to 5 cm.
+  /// Height of the wheels above the ground's plane [m], if the beams show it to 5 cm.
   [[nodiscard]] std::optional<double> height() const;
-  /// Unit normal of the ground in the body frame, if the beams tell it to 5 degrees.
+  /// Unit normal of the ground in the body frame, if the beams show it to 5 degrees.
   [[nodiscard]] std::optional<Eigen::Vector3d> n_B() const;
 
  private:

@@ -11,7 +11,7 @@ namespace {
 constexpr double kSpinUp = 0.1;     // [s] chosen: after a touchdown until the wheels roll
 constexpr double kLevelOff = 0.05;  // [m] chosen: of a plane from the wheels that stand on it
 constexpr double kLeanOff = 0.2;    // chosen: sine of the axle's angle to it
-constexpr double kPatience = 0.47;  // [s] chosen: readings that contradict the wheels for so long are believed
+constexpr double kPatience = 0.47;  // [s] chosen: readings that contradict the wheels for so long are accepted
 
 /// Since when has it been so, in a row? Has it been for kPatience?
 bool lasts(bool holds, std::optional<TimeNs>& since_ns, TimeNs t_ns) {

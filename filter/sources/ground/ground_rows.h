@@ -1,5 +1,5 @@
 // The ground under the vehicle as a plane, and the laser beams that see it. The paper's III-B; docs/filter.md,
-// section 7.
+// "Ground and beams".
 #pragma once
 
 #include <Eigen/Core>

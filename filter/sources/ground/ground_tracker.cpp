@@ -10,7 +10,7 @@ namespace ear {
 namespace {
 
 constexpr double kUnevenness = 0.004;    // [m] of the ground under a beam against the plane
-constexpr double kNormalWalk = 0.1;      // [rad/sqrt(m)] how the normal changes with the way
+constexpr double kNormalWalk = 0.1;      // [rad/sqrt(m)] how the normal changes with the distance
 constexpr double kSlope = 0.2;           // [rad] standard deviation of the ground's slopes
 constexpr double kStuck = 0.07;          // [s] chosen: equal readings for so long, and the beam is stuck,
 constexpr int kFewestEqual = 4;          // chosen: but not fewer; noise makes two equal ones a chance of some percent

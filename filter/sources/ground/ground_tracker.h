@@ -27,8 +27,8 @@ class GroundTracker {
   void move(double distance);
   /// The rate of climb may have changed at once: a strike.
   void strike();
-  /// The wheels are said to be `level` above the plane, with standard deviation `sigma` [m]. Ignored if the beams say
-  /// otherwise.
+  /// The wheels are taken to be `level` above the plane, with standard deviation `sigma` [m]. Ignored if the beams
+  /// contradict it.
   void suppose_height(double level, double sigma);
 
   /// How one reading of the beams agreed with the plane tracked so far.

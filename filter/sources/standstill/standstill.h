@@ -17,7 +17,7 @@ class Standstill {
 
   void add(const WheelIncrement& increment) { wheel_rest_.add(increment); }
 
-  /// What tells whether the vehicle stands, at a frame.
+  /// What shows whether the vehicle stands, at a frame.
   struct Evidence {
     const FeatureFrame& frame;
     TimeNs t_ns = 0;  ///< IMU time

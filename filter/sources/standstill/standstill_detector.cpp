@@ -8,7 +8,7 @@
 
 namespace ear {
 namespace {
-constexpr std::size_t kMinCommonFeatures = 8;  // fewer do not tell motion from mismatches
+constexpr std::size_t kMinCommonFeatures = 8;  // fewer do not set motion apart from mismatches
 constexpr double kNoRest = 0.05;               // [s] wheels that turned so lately turn
 constexpr double kWheelPlay = 0.005;           // [rad] that a wheel at rest may turn: 0.4 mm of its rim
 }  // namespace

@@ -35,7 +35,7 @@ class StandstillDetector {
 
   /// Looks at one frame. `imu`: the samples of the last config.duration seconds. `gyro_bias` [rad/s]; `max_gyro`
   /// [rad/s]: how far the mean rate may be from it. `wheel_rest`: for how long the wheels have not turned [s], nothing
-  /// where they tell nothing. True if the vehicle has stood for config.duration.
+  /// where they show nothing. True if the vehicle has stood for config.duration.
   bool update(const FeatureFrame& frame, const ImuStatistics& imu, const Eigen::Vector3d& gyro_bias, double max_gyro,
               std::optional<double> wheel_rest);
 

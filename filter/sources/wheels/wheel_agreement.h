@@ -1,5 +1,5 @@
-// Do the two wheels tell the same, given how fast the gyroscope says that the axle turns? One that hangs in the air,
-// slips or has a broken encoder does not. docs/filter.md, section 8.
+// Do the two wheels agree, given how fast the axle turns by the gyroscope? One that hangs in the air,
+// slips or has a broken encoder does not. docs/filter.md, "Wheels".
 #pragma once
 
 #include "ear/types.h"

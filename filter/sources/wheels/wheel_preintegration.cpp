@@ -41,7 +41,7 @@ struct Advance {
 };
 
 /// `rolled` [m], left and right; `climb` [m]: how far the one rose and the other sank beside the middle. That is part
-/// of what they rolled, not of the way ahead.
+/// of what they rolled, not of the distance ahead.
 Advance advance_of_middle(const Eigen::Vector2d& rolled, double climb) {
   Advance advance;
   for (int wheel = 0; wheel < 2; ++wheel) {

@@ -1,5 +1,5 @@
 // The displacement of the axle's middle O between two instants i and j, from wheels, gyroscope and the ground's normal:
-// the paper's pre-integration, (9)-(11). Derivation: docs/filter.md, section 10.
+// the paper's pre-integration, (9)-(11). Derivation: docs/filter.md, "Pre-integration".
 //
 //   alpha = sum over encoder intervals k of R_BiBk f_k s_k dt
 //   s_k dt = mean over both wheels of radius * (turn relative to the body + turn of the body about the axle)
@@ -26,7 +26,7 @@ struct WheelNoise {
   double slip = 0.0;         ///< along the track [m/sqrt(m)]
   double side_slip = 0.0;    ///< along the axle [m/sqrt(m)]
   double roughness = 0.0;    ///< through the ground [m/sqrt(m)]
-  double normal_walk = 0.0;  ///< how the ground's normal turns, each way [rad/sqrt(m)]
+  double normal_walk = 0.0;  ///< how the ground's normal turns, each axis [rad/sqrt(m)]
 };
 
 /// The displacement with its covariance, what it was computed with, and its derivatives by that. Vectors are in B_i.

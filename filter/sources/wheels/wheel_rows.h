@@ -1,4 +1,4 @@
-// What the wheel encoders say about the body's velocity. The paper's (5)-(8); docs/filter.md, section 8.
+// What the wheel encoders show of the body's velocity. The paper's (5)-(8); docs/filter.md, "Wheels".
 #pragma once
 
 #include <Eigen/Core>
@@ -21,9 +21,9 @@ struct WheelRows {
   Eigen::Matrix<double, size, 1> residual;
   Eigen::Matrix<double, size, kGroundColumns> H = Eigen::Matrix<double, size, kGroundColumns>::Zero();
   Eigen::Matrix<double, size, 3> J_gyro;  ///< of the prediction by the measured rate
-  double wheel_speed = 0.0;               ///< forward speed that the wheels tell [m/s]
+  double wheel_speed = 0.0;               ///< forward speed that the wheels measure [m/s]
 
-  /// In place of the mean of both wheels, one of them and the gyroscope's yaw rate tell the speed. `lever`: where it
+  /// In place of the mean of both wheels, one of them and the gyroscope's yaw rate give the speed. `lever`: where it
   /// stands on the axle, half the track width; negative for the left one [m].
   void take_one_wheel(double lever);
 };

@@ -25,7 +25,7 @@ void Wheels::update(const WheelIncrement& increment, const Context& context, Ekf
   Sigmas sigma = noise_of(rows, increment, rate, x);
   log(rows, sigma, increment.to_ns, ekf, records.log);
 
-  // Without lasers, roll and the gyroscope's bias are told apart by nothing else: both turn the path sideways.
+  // Without lasers, roll and the gyroscope's bias are set apart by nothing else: both turn the path sideways.
   const bool terrain = config_.model == OdometerModel::terrain;
   const bool use_yaw_rate =
       config_.model == OdometerModel::differential || config_.yaw_rate || (terrain && !sees_ground_);
