@@ -5,6 +5,8 @@
 
 namespace ear {
 
+void LiveState::set(const std::optional<NavState>& state, TimeNs sample_ns) { latest_.put({state, sample_ns}); }
+
 void LiveState::add(const ImuSample& sample) {
   if (is_time(sample.t_ns) && sample.gyro_B.allFinite() && sample.accel_B.allFinite()) take(sample);
   if (const Given* const given = latest_.take()) begin(*given);

@@ -19,7 +19,7 @@ class LiveState {
   explicit LiveState(std::size_t samples) : samples_(samples) {}
 
   /// By the estimator's thread: the state at the sample with this stamp [ns], or nothing where there is none.
-  void set(const std::optional<NavState>& state, TimeNs sample_ns) { latest_.put({state, sample_ns}); }
+  void set(const std::optional<NavState>& state, TimeNs sample_ns);
 
   /// By the inertial sensor's thread, for each sample.
   void add(const ImuSample& sample);

@@ -14,7 +14,8 @@ namespace {
 constexpr double kMinCapacity = 16.0;  // elements of a queue
 constexpr double kMaxSeconds = 60.0;
 constexpr std::size_t kMaxFrameSlots = 64;
-constexpr int kMaxImageSize = 16384;  // [px]
+constexpr int kMaxImageSize = 16384;       // [px]
+constexpr double kLargestOffset = 3600.0;  // [s] of the cameras' clock
 
 void require(bool condition, const char* what) {
   if (!condition) throw std::invalid_argument(what);
@@ -35,6 +36,8 @@ const Calibration& checked(const Calibration& calibration, const QueueCapacity& 
           "calibration: the rate of the lasers must be positive, at most 100 kHz");
   require(!calibration.lasers || calibration.lasers->beams.size() <= QueuedOdometry::kMaxBeams,
           "calibration: at most three laser beams");
+  require(std::abs(calibration.camera_time_offset) <= kLargestOffset,
+          "calibration: camera_time_offset must be a number of seconds, at most an hour");
   return calibration;
 }
 
@@ -99,6 +102,9 @@ StereoFrame QueuedOdometry::view_of(const Frame& frame) const {
   return view;
 }
 
+/// The sum as a difference, which stays in range whatever the camera's stamp is.
+TimeNs QueuedOdometry::imu_time(TimeNs camera_ns) const { return duration_ns(-camera_offset_ns_, camera_ns); }
+
 /// Up to and with the first inertial sample that is not earlier than `until_ns`: an interval ends between two samples.
 void QueuedOdometry::hand_over(TimeNs until_ns) {
   constexpr TimeNs kNever = std::numeric_limits<TimeNs>::max();
@@ -131,7 +137,7 @@ void QueuedOdometry::drop_old_frames() {
   while (2 * imu_.queue.size() > imu_.queue.capacity() && frames_.queue.size() > 1) {
     frames_.queue.pop();
     frames_.overflows.fetch_add(1, std::memory_order_relaxed);
-    hand_over(frames_.queue.front()->t_ns + camera_offset_ns_);
+    hand_over(imu_time(frames_.queue.front()->t_ns));
   }
 }
 
@@ -159,7 +165,7 @@ Progress QueuedOdometry::process(std::optional<Estimate>& estimate) {
     hand_over(std::numeric_limits<TimeNs>::max());
     return Progress::no_frame;
   }
-  const TimeNs frame_ns = frame->t_ns + camera_offset_ns_;
+  const TimeNs frame_ns = imu_time(frame->t_ns);
   hand_over(frame_ns);
   if (newest_imu_ns_ < frame_ns && !frames_.queue.full()) return Progress::no_frame;
   estimate = odometry_.add_stereo(view_of(*frame));

@@ -100,6 +100,7 @@ class QueuedOdometry {
   }
 
   [[nodiscard]] StereoFrame view_of(const Frame& frame) const;
+  [[nodiscard]] TimeNs imu_time(TimeNs camera_ns) const;
   void drop_old_frames();
   void hand_over(TimeNs until_ns);
   void log_overflows();

@@ -1,3 +1,24 @@
+add_library(doctest_main OBJECT ${PROJECT_SOURCE_DIR}/tests/support/main.cpp)
+ear_target(doctest_main)
+target_link_libraries(doctest_main PUBLIC doctest::doctest)
+
+# What `tools/test --asan` builds and runs: the unit tests of these folders, their ctest label is `sanitized` too.
+set(EAR_SANITIZED_FOLDERS ear filter frontend recording odometry smoother evaluation fuzz)
+add_custom_target(sanitized_tests)
+
+# ear_register(TARGET NAME LABEL TIMEOUT): what all tests have in common.
+function(ear_register target name label timeout)
+  if(CMAKE_CROSSCOMPILING OR EAR_SANITIZE)
+    math(EXPR timeout "10 * ${timeout}")  # emulated, or with all checks
+  endif()
+  get_filename_component(folder ${CMAKE_CURRENT_SOURCE_DIR} NAME)
+  if(label STREQUAL unit AND folder IN_LIST EAR_SANITIZED_FOLDERS)
+    add_dependencies(sanitized_tests ${target})
+    list(APPEND label sanitized)
+  endif()
+  set_tests_properties(${name} PROPERTIES LABELS "${label}" TIMEOUT ${timeout})
+endfunction()
+
 # ear_test(NAME name SOURCES a.cpp ... LIBRARIES target ... [LABEL unit|consistency|replay|bench] [TIMEOUT s]
 #          [ARGUMENTS of the program ...])
 # builds one doctest program and gives it to ctest: a test source cannot be built and forgotten.
@@ -9,15 +30,14 @@ function(ear_test)
   if(NOT arg_TIMEOUT)
     set(arg_TIMEOUT 120)
   endif()
-  if(CMAKE_CROSSCOMPILING)
-    math(EXPR arg_TIMEOUT "10 * ${arg_TIMEOUT}")  # emulated
-  endif()
   set(target test_${arg_NAME})
-  add_executable(${target} ${PROJECT_SOURCE_DIR}/tests/support/main.cpp ${arg_SOURCES})
+  add_executable(${target} ${arg_SOURCES})
   ear_target(${target})
   target_include_directories(${target} PRIVATE ${PROJECT_SOURCE_DIR}/tests)
-  target_link_libraries(${target} PRIVATE doctest::doctest ${arg_LIBRARIES})
-  target_compile_definitions(${target} PRIVATE EAR_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
+  target_link_libraries(${target} PRIVATE doctest_main ${arg_LIBRARIES})
+  target_compile_definitions(${target} PRIVATE EAR_SOURCE_DIR="${PROJECT_SOURCE_DIR}"
+                                               $<$<BOOL:${EAR_SANITIZE}>:EAR_SANITIZED>)
   add_test(NAME ${arg_NAME} COMMAND ${target} ${arg_ARGUMENTS})
-  set_tests_properties(${arg_NAME} PROPERTIES LABELS ${arg_LABEL} TIMEOUT ${arg_TIMEOUT})
+  ear_register(${target} ${arg_NAME} ${arg_LABEL} ${arg_TIMEOUT})
+  set_tests_properties(${arg_NAME} PROPERTIES SKIP_RETURN_CODE 77)  # see tests/support/skip.h
 endfunction()

@@ -138,8 +138,9 @@ bool Ekf::possible() const {
   const ImuState& x = state_.imu;
   const OdometerState& o = state_.odometer;
   const auto P = covariance_.matrix();
-  const bool finite = x.R_WB.allFinite() && x.p_WB.allFinite() && x.v_W.allFinite() && x.b_g.allFinite() &&
-                      x.b_a.allFinite() && state_.camera.T_BC0.R.allFinite() && state_.camera.T_BC0.p.allFinite() &&
+  const bool finite = std::abs(state_.camera.time_offset) <= kLargestTimeOffset && x.R_WB.allFinite() &&
+                      x.p_WB.allFinite() && x.v_W.allFinite() && x.b_g.allFinite() && x.b_a.allFinite() &&
+                      state_.camera.T_BC0.R.allFinite() && state_.camera.T_BC0.p.allFinite() &&
                       o.wheel_radius.allFinite() && std::isfinite(o.track_width) && o.T_BO.R.allFinite() &&
                       state_.ground.n_W.allFinite() && std::isfinite(P.sum());  // one that is not makes the sum so
   return finite && P.diagonal().minCoeff() >= 0.0;

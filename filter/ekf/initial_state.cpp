@@ -40,6 +40,8 @@ const Calibration& checked(const Calibration& calibration) {
     require((R * R.transpose() - Eigen::Matrix3d::Identity()).norm() < 1e-3 && R.determinant() > 0.0,
             "calibration: a camera's T_BS holds no rotation");
   }
+  require(std::abs(calibration.camera_time_offset) <= kLargestTimeOffset,
+          "calibration: camera_time_offset must be a number of seconds, at most an hour");
   require(calibration.imu.gyro_noise > 0.0 && calibration.imu.accel_noise > 0.0,
           "calibration: imu noise must be positive");
   if (const auto& encoder = calibration.encoder) {

@@ -37,11 +37,11 @@ Eigen::Vector3d rotation_between(const Eigen::Vector3d& a, const Eigen::Vector3d
 }  // namespace
 
 TimeNs imu_time(TimeNs camera_time_ns, const CameraState& camera) {
-  return camera_time_ns + static_cast<TimeNs>(std::llround(1e9 * camera.time_offset));
+  return duration_ns(-static_cast<TimeNs>(std::llround(1e9 * camera.time_offset)), camera_time_ns);
 }
 
 TimeNs camera_time(TimeNs imu_time_ns, const CameraState& camera) {
-  return imu_time_ns - static_cast<TimeNs>(std::llround(1e9 * camera.time_offset));
+  return duration_ns(static_cast<TimeNs>(std::llround(1e9 * camera.time_offset)), imu_time_ns);
 }
 
 Eigen::Matrix<double, 3, 2> tangent_basis(const Eigen::Vector3d& n) {

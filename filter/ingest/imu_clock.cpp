@@ -40,7 +40,7 @@ void ImuClock::follow(TimeNs driver_ns) {
   if (last_ns_) {
     const double step = seconds_between(*last_ns_, driver_ns);
     if (interval_ == 0.0 && step > 0.0) interval_ = std::min(step, kClockJump);
-    if (!jumps(step)) interval_ += (step - interval_) / kMemory;
+    if (std::abs(step - interval_) <= kClockJump) interval_ += (step - interval_) / kMemory;
   }
   last_ns_ = driver_ns;
   for (Other& other : others_) other.before_ns = other.newest_ns;
@@ -54,7 +54,7 @@ void ImuClock::add(const ImuSample& sample) {
     return;
   }
   if (waiting_) {
-    const double step = seconds_between(samples_.back().t_ns, sample.t_ns);
+    const double step = seconds_between(newest_waiting(), sample.t_ns);
     const bool follows = step > 0.0 && !jumps(step);
     const bool long_enough =
         samples_.size() >= kMostWaiting || static_cast<double>(samples_.size()) * interval_ > kLongestWait;
@@ -85,15 +85,23 @@ void ImuClock::observe(Stream stream, TimeNs stamp_ns) {
   other.newest_ns = stamp_ns;
 }
 
+/// While samples wait, the first of them has a stamp that is a time; later ones may have none.
+TimeNs ImuClock::newest_waiting() const {
+  std::size_t n = samples_.size();
+  while (n > 1 && !is_time(samples_[n - 1].t_ns)) --n;
+  return samples_[n - 1].t_ns;
+}
+
 void ImuClock::settle(bool own_clock) {
   waiting_ = false;
+  const TimeNs newest_ns = newest_waiting();
   if (own_clock) {
     shift_ns_ += std::llround(1e9 * jump_);
-    corrected_ns_ = samples_.back().t_ns;
+    corrected_ns_ = newest_ns;
     contradictions_ = 0;
     ++corrected_;
   }
-  follow(samples_.back().t_ns);
+  follow(newest_ns);
 }
 
 /// Do the others' stamps keep their usual distance? Where, after a verdict, they turn out to have jumped as well, it is

@@ -48,6 +48,7 @@ class ImuClock {
   [[nodiscard]] bool jumps(double step) const;
   [[nodiscard]] bool others_show(double step) const;
   void follow(TimeNs driver_ns);
+  [[nodiscard]] TimeNs newest_waiting() const;
   void settle(bool own_clock);
   void review(Other& other, TimeNs stamp_ns);
 

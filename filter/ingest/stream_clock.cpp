@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "filter/ingest/clock_jump.h"
+#include "filter/ingest/stamp_guard.h"
 
 namespace ear {
 namespace {
@@ -40,6 +41,7 @@ void StreamClock::follow(TimeNs t_ns, std::optional<TimeNs> now_ns) {
 }
 
 std::optional<TimeNs> StreamClock::correct(TimeNs stamp_ns, std::optional<TimeNs> now_ns) {
+  if (!is_time(stamp_ns)) return stamp_ns;  // for the input guard to refuse
   TimeNs t_ns = stamp_ns - shift_ns_;
   if (count_ >= kToKnow && now_ns && last_ns_ && last_now_ns_) {
     const double jump = jump_at(t_ns, *now_ns);

@@ -9,6 +9,8 @@
 namespace ear {
 namespace {
 
+constexpr TimeNs kLargestTime = 4'500'000'000'000'000'000;  // [ns] 142 years: differences of two fit 64 bits
+
 [[noreturn]] void malformed(const std::string& column, std::string_view field, const char* expected) {
   throw RowError{RowError::Kind::malformed, column, "'" + std::string(field) + "' is not " + expected};
 }
@@ -19,11 +21,16 @@ void require_columns(const CsvRow& row, std::size_t count) {
                  std::to_string(row.fields.size()) + " fields, not " + std::to_string(count)};
 }
 
-TimeNs stamp(const CsvRow& row) {
-  const auto t_ns = parse_integer(row.fields[0]);
-  if (!t_ns) malformed("timestamp", row.fields[0], "a whole number of nanoseconds");
+TimeNs time(const CsvRow& row, std::size_t index, const char* column) {
+  const auto t_ns = parse_integer(row.fields[index]);
+  if (!t_ns) malformed(column, row.fields[index], "a whole number of nanoseconds");
+  if (*t_ns <= -kLargestTime || *t_ns >= kLargestTime) {
+    malformed(column, row.fields[index], "within 142 years of the clock's zero");
+  }
   return *t_ns;
 }
+
+TimeNs stamp(const CsvRow& row) { return time(row, 0, "timestamp"); }
 
 double number(const CsvRow& row, std::size_t index, const std::string& column) {
   const auto value = parse_double(row.fields[index]);
@@ -90,9 +97,7 @@ ImageRow parse_image_row(const CsvRow& row) {
 
 ArrivalRow parse_arrival_row(const CsvRow& row) {
   require_columns(row, 2);
-  const auto arrival_ns = parse_integer(row.fields[1]);
-  if (!arrival_ns) malformed("arrival", row.fields[1], "a whole number of nanoseconds");
-  return {stamp(row), *arrival_ns};
+  return {stamp(row), time(row, 1, "arrival")};
 }
 
 }  // namespace ear

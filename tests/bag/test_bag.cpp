@@ -10,6 +10,7 @@
 #include "src/recording/config_file.h"
 #include "src/recording/recording.h"
 #include "tests/recording/support.h"
+#include "tests/support/skip.h"
 
 using namespace ear;
 using namespace ear::test;
@@ -66,10 +67,10 @@ void write_bag(const fs::path& file, const BagTopics& topics = {}) {
   bag.close();
 }
 
-/// False, with a message, where this program has no bags.
+/// False, and skipped, where this program has no bags.
 bool possible() {
   if (bags_are_built()) return true;
-  MESSAGE("skipped: built without ROS bags");
+  skip("built without ROS bags");
   return false;
 }
 

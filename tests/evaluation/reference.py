@@ -66,7 +66,7 @@ def gaps(t):
 
 def associate(t_est, t, p, R):
     """Rows (index, truth position, truth rotation, segment), and how many poses are outside or in gaps."""
-    truth_gaps, gaps = gaps(t), gaps(t_est)
+    truth_gaps, estimate_gaps = gaps(t), gaps(t_est)
     matches, outside, in_gaps = [], 0, 0
     for i, time in enumerate(t_est):
         if time < t[0] or time > t[-1]:
@@ -75,7 +75,7 @@ def associate(t_est, t, p, R):
         if any(a < time < b for a, b in truth_gaps):
             in_gaps += 1
             continue
-        segment = (sum(b <= time for _, b in truth_gaps), sum(b <= time for _, b in gaps))
+        segment = (sum(b <= time for _, b in truth_gaps), sum(b <= time for _, b in estimate_gaps))
         b = bisect.bisect_left(t, time)
         if t[b] == time:
             position, rotation = p[b], R[b]

@@ -61,6 +61,12 @@ TEST_CASE("association: a gap is three median intervals, but at least 0.1 s") {
   CHECK(gap_limit({pose(0.0, 0.0)}) == 100'000'000);
 }
 
+TEST_CASE("association: poses a century apart lie within the largest gap that there is") {
+  const Trajectory apart{pose(-4e9, 0.0), pose(4e9, 0.0)};  // seconds
+  CHECK(gap_limit(apart) > 8'000'000'000'000'000'000);
+  CHECK(associate({pose(0.0, 0.0)}, apart).matches.size() == 1);
+}
+
 TEST_CASE("coverage: the share of the truth's time in which the estimate runs") {
   const Trajectory truth = line(0.0, 10.0, 0.02);
   CHECK(coverage(associate(line(2.5, 7.5, 0.1), truth), truth) == doctest::Approx(0.5));

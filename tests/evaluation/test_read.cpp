@@ -162,7 +162,11 @@ TEST_CASE("read: what is wrong is named with file, line and field") {
         ":2: field 'q_w' (column 5): quaternion of length 0.500000");
   CHECK(complaint("a.csv", kEurocHeader + "1x,0,0,0,1,0,0,0\n") == ":2: field 'time' (column 1): '1x' is no time");
   CHECK(complaint("a.tum", "99999999999 0 0 0 0 0 0 1\n") ==
-        ":1: field 'time' (column 1): '99999999999' does not fit 64 bits of nanoseconds");
+        ":1: field 'time' (column 1): '99999999999' is more than 142 years from zero");
+  CHECK(complaint("a.csv", kEurocHeader + "9223372036854775807.5,0,0,0,1,0,0,0\n") ==
+        ":2: field 'time' (column 1): '9223372036854775807.5' is more than 142 years from zero");
+  CHECK(complaint("a.tum", "-9e9 0 0 0 0 0 0 1\n9e9 0 0 0 0 0 0 1\n") ==
+        ":1: field 'time' (column 1): '-9e9' is more than 142 years from zero");
   CHECK(complaint("a.tum", "1 0 0 0 0 0 0 1\n\n2 0 0 0 0 0 0\n") ==
         ":3: 7 fields where 8 are expected: the line is torn");
   CHECK(complaint("a.csv", "t_ns,p_x,p_y,p_z,q_w,q_x,q_z\n1,0,0,0,1,0,0\n") == ":1: the header has no column 'q_y'");

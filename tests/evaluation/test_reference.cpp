@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "tests/evaluation/support.h"
+#include "tests/support/skip.h"
 #include "tools/evaluation/evaluate.h"
 #include "tools/evaluation/read.h"
 #include "tools/evaluation/summary.h"
@@ -134,7 +135,7 @@ void compare(const Json& expected, const Json& actual, const std::string& where)
 
 void check_against_reference(double extent, unsigned seed) {
   if (std::string(EAR_NUMPY_PYTHON).empty()) {
-    MESSAGE("skipped: no python3 with numpy was found when this was configured");
+    test::skip("no python3 with numpy was found when this was configured");
     return;
   }
   std::mt19937_64 rng{seed};

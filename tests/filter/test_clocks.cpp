@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <limits>
+#include <optional>
 #include <vector>
 
 #include "filter/ingest/imu_clock.h"
@@ -105,6 +107,49 @@ TEST_CASE("imu clock: one false stamp is none, nor are the wheels' own jumps") {
   CHECK(largest_error(run(sound, jumping, sound)) == 0.0);
 }
 
+TEST_CASE("imu clock: a stamp that is no time, among samples that wait, changes no verdict") {
+  for (const TimeNs no_time : {std::numeric_limits<TimeNs>::min(), std::numeric_limits<TimeNs>::max()}) {
+    CAPTURE(no_time);
+    ImuClock clock;
+    ImuSample sample;
+    int out = 0;
+    const auto fetch = [&] {
+      while (const auto next = clock.next()) ++out;
+    };
+    for (int i = 0; i < 1000; ++i) {
+      sample.t_ns = i * 5 * kMs + (i >= 400 ? 200 * kMs : 0);
+      clock.add(sample);
+      if (i == 401) {
+        REQUIRE(clock.waiting());
+        sample.t_ns = no_time;
+        clock.add(sample);
+      }
+      fetch();
+      if (i % 2 == 0) clock.observe(ImuClock::Stream::encoder, i * 5 * kMs);
+      fetch();
+    }
+    CHECK(clock.jumps_corrected() == 1);
+    CHECK(out == 1001);
+  }
+}
+
+TEST_CASE("imu clock: after a long gap the samples come out at once, and a jump is found") {
+  ImuClock clock;
+  ImuSample sample;
+  int waited = 0;
+  for (int i = 0; i < 1500; ++i) {
+    const TimeNs t_ns = i * 5 * kMs + (i >= 400 ? 10'000 * kMs : 0);
+    sample.t_ns = t_ns + (i >= 1000 ? 200 * kMs : 0);
+    clock.add(sample);
+    if (i < 1000 && clock.waiting()) ++waited;
+    while (clock.next()) continue;
+    if (i % 2 == 0) clock.observe(ImuClock::Stream::encoder, t_ns);
+    while (clock.next()) continue;
+  }
+  CHECK(waited == 0);
+  CHECK(clock.jumps_corrected() == 1);
+}
+
 TEST_CASE("imu clock: a verdict that later readings contradict is undone") {
   ImuClock clock;
   TimeNs newest = 0;
@@ -186,6 +231,21 @@ TEST_CASE("stream clock: one false stamp is left out, and clocks that jump toget
   const Driver jumping = [](TimeNs t) { return amiss(t) ? t + 100 * kMs : t; };
   const auto with_all = [](TimeNs t) { return (amiss(t) ? 100 * kMs : 0) + 12 * kMs; };
   for (const Out& o : run_stream(jumping, with_all)) CHECK(o.stamp == jumping(o.t));
+}
+
+TEST_CASE("stream clock: stamps that are no times go through as they are, and change nothing") {
+  StreamClock clock;
+  for (int i = 0; i < 400; ++i) {
+    const TimeNs now_ns = i * 10 * kMs;
+    const TimeNs jump = i >= 200 ? 200 * kMs : 0;  // taken out: a shift to subtract
+    if (i % 50 == 7) {
+      CHECK(clock.correct(std::numeric_limits<TimeNs>::min(), now_ns) == std::numeric_limits<TimeNs>::min());
+      CHECK(clock.correct(std::numeric_limits<TimeNs>::max(), now_ns) == std::numeric_limits<TimeNs>::max());
+    }
+    const std::optional<TimeNs> stamp = clock.correct(now_ns + jump, now_ns);
+    if (i != 200) CHECK(stamp == now_ns);
+  }
+  CHECK(clock.jumps() == 1);
 }
 
 TEST_CASE("stream clock: while nobody knows the time it changes nothing") {

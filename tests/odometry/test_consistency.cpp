@@ -1,4 +1,6 @@
-// Is the error what the covariance says? Monte-Carlo on simulated feature tracks, against chi-squared bands.
+// Is the error what the covariance says? Monte-Carlo on simulated feature tracks: with the simulator's own noise as
+// settings against chi-squared bands, which the filter's mathematics must meet, and with the shipped settings, where
+// the mean NEES is stated.
 #include <doctest/doctest.h>
 
 #include <Eigen/Cholesky>
@@ -19,6 +21,7 @@ using namespace ear;
 namespace {
 
 constexpr int kRuns = 50;
+constexpr int kShippedRuns = 30;
 constexpr double kDuration = 60.0;  // [s]
 constexpr double kMoving = 5.0;     // [s] from here on: it has left its start, where the pose is known by definition
 
@@ -37,34 +40,42 @@ struct Case {
   const char* sequence;
   bool calibrate;  ///< false: the calibration is the true one, and fixed
   bool odometer;
+  bool shipped = false;  ///< all settings as shipped
 };
+
+/// Mean NEES over runs and time, and its standard deviation.
+struct Mean {
+  double nees, sigma;
+};
+
+/// As measured with the shipped settings, where 3 is consistent. All but one are less, by 2.7 to 5.6 of their standard
+/// deviations: the covariance is too large there, since the settings are for rougher ground than the simulator's.
+struct Stated {
+  const char* sequence;
+  Mean position, orientation;
+};
+constexpr std::array kStated = {Stated{"flat1", {2.20, 0.19}, {2.43, 0.13}},
+                                Stated{"wave1", {2.07, 0.22}, {2.82, 0.20}},
+                                Stated{"fly1", {2.40, 0.23}, {2.36, 0.11}}};
+constexpr double kStatedSigmas = 3.0;  // so far may a change of the filter move the mean, either way
 
 struct Nees {
   std::vector<double> position, orientation;  // per frame
 };
 
-/// The simulated ground is flat and its wheels do not slip, unlike real ones, for which the defaults are.
-void expect_simulated_ground(OdometerConfig& odometer) {
-  odometer.slip = 1e-5;
-  odometer.side_slip = 1e-5;
-  odometer.side_slip_turn = 1e-5;
-  odometer.roughness = 1e-5;
-  odometer.speed_sigma = 3e-4;
-  odometer.normal_walk = 1e-3;
-  odometer.unevenness = 1e-4;
-}
-
-Nees run(const Case& setup, std::uint64_t seed) {
-  simulator::Options options;
-  options.sequence = setup.sequence;
-  options.seed = seed;
-  options.perfect_calibration = !setup.calibrate;
-  options.duration = kDuration;
-  const simulator::Simulation simulation(options);
+/// What the simulator does: its ground is flat and its wheels do not slip, unlike real ones, for which the defaults
+/// are.
+FilterConfig simulated_noise(const Case& setup, const simulator::Options& options) {
   FilterConfig config;
   config.feature_sigma_px = options.track.sigma_px;
   config.odometer.model = setup.odometer ? OdometerModel::terrain : OdometerModel::none;
-  expect_simulated_ground(config.odometer);
+  config.odometer.slip = 1e-5;
+  config.odometer.side_slip = 1e-5;
+  config.odometer.side_slip_turn = 1e-5;
+  config.odometer.roughness = 1e-5;
+  config.odometer.speed_sigma = 3e-4;
+  config.odometer.normal_walk = 1e-3;
+  config.odometer.unevenness = 1e-4;
   config.online_calibration.camera_extrinsics = setup.calibrate;
   config.online_calibration.time_offset = setup.calibrate;
   config.online_calibration.wheels = setup.calibrate;
@@ -76,7 +87,17 @@ Nees run(const Case& setup, std::uint64_t seed) {
   config.prior.camera_position = 1e-5;
   config.prior.stereo_position = 1e-5;
   config.prior.time_offset = 1e-3;
-  Filter filter(config, simulation.calibration());
+  return config;
+}
+
+Nees run(const Case& setup, std::uint64_t seed) {
+  simulator::Options options;
+  options.sequence = setup.sequence;
+  options.seed = seed;
+  options.perfect_calibration = !setup.calibrate;
+  options.duration = kDuration;
+  const simulator::Simulation simulation(options);
+  Filter filter(setup.shipped ? FilterConfig{} : simulated_noise(setup, options), simulation.calibration());
 
   Nees nees;
   for (const test::EvaluatedEstimate& e : test::run_filter(filter, simulation)) {
@@ -90,13 +111,13 @@ Nees run(const Case& setup, std::uint64_t seed) {
   return nees;
 }
 
-std::vector<Nees> run_all(const Case& setup, std::uint64_t first_seed) {
-  std::vector<Nees> all(kRuns);
+std::vector<Nees> run_all(const Case& setup, std::uint64_t first_seed, int runs = kRuns) {
+  std::vector<Nees> all(static_cast<std::size_t>(runs));
   std::atomic<int> next{0};
   std::vector<std::thread> threads;
   for (unsigned i = 0; i < std::max(1U, std::thread::hardware_concurrency()); ++i) {
     threads.emplace_back([&] {
-      for (int run_index = next++; run_index < kRuns; run_index = next++) {
+      for (int run_index = next++; run_index < runs; run_index = next++) {
         all[static_cast<std::size_t>(run_index)] = run(setup, first_seed + static_cast<std::uint64_t>(run_index));
       }
     });
@@ -115,23 +136,24 @@ struct Judgement {
 
 /// The band: where 95 % of the means over the runs of chi-squared numbers of 3 dof lie.
 Judgement judge(const std::vector<Nees>& runs, const std::vector<double> Nees::*which, const std::string& name) {
-  const double low = Gate(0.025, 3 * kRuns).quantile(3 * kRuns) / kRuns;
-  const double high = Gate(0.975, 3 * kRuns).quantile(3 * kRuns) / kRuns;
+  const auto count = static_cast<int>(runs.size());
+  const double low = Gate(0.025, 3 * count).quantile(3 * count) / count;
+  const double high = Gate(0.975, 3 * count).quantile(3 * count) / count;
   std::size_t frames = (runs.front().*which).size();
   for (const Nees& nees : runs) frames = std::min(frames, (nees.*which).size());
   REQUIRE(frames > 1000);
   Eigen::ArrayXd over_runs = Eigen::ArrayXd::Zero(static_cast<Eigen::Index>(frames));
-  Eigen::Array<double, kRuns, 1> over_time;
-  for (int i = 0; i < kRuns; ++i) {
+  Eigen::ArrayXd over_time(count);
+  for (int i = 0; i < count; ++i) {
     const Eigen::Map<const Eigen::ArrayXd> nees((runs[static_cast<std::size_t>(i)].*which).data(), over_runs.size());
-    over_runs += nees / kRuns;
+    over_runs += nees / count;
     over_time(i) = nees.mean();
   }
   Judgement judgement;
   judgement.above = (over_runs > high).cast<double>().mean();
   judgement.inside = (over_runs >= low && over_runs <= high).cast<double>().mean();
   judgement.mean = over_time.mean();
-  judgement.mean_sigma = std::sqrt((over_time - judgement.mean).square().sum() / (kRuns - 1) / kRuns);
+  judgement.mean_sigma = std::sqrt((over_time - judgement.mean).square().sum() / (count - 1) / count);
   MESSAGE(name << ": mean NEES " << judgement.mean << " +- " << judgement.mean_sigma << " of 3, " << judgement.inside
                << " of the time within " << low << " to " << high << ", " << judgement.above << " above");
   return judgement;
@@ -161,13 +183,25 @@ double average_share(const std::vector<Judgement>& judgements) {
 
 }  // namespace
 
-TEST_CASE("consistency: fifty runs") {
+TEST_CASE("consistency: with the simulator's noise as settings, fifty runs are in their bands") {
   const std::vector<Judgement> judgements = measure(kFirstSeed);
   for (const Judgement& judgement : judgements) {
     CHECK(judgement.inside >= kShare);
     CHECK(std::abs(judgement.mean - 3.0) <= kSigmas * judgement.mean_sigma);
   }
   CHECK(average_share(judgements) >= kAverageShare);
+}
+
+TEST_CASE("consistency: with the shipped settings, the mean NEES of thirty runs is the one stated") {
+  const auto check = [](double mean, const Mean& stated) {
+    CHECK(std::abs(mean - stated.nees) <= kStatedSigmas * stated.sigma);
+  };
+  for (const auto& [sequence, position, orientation] : kStated) {
+    const std::vector<Nees> runs = run_all({sequence, true, true, true}, kFirstSeed, kShippedRuns);
+    const std::string name = std::string(sequence) + ", shipped settings";
+    check(judge(runs, &Nees::position, name + ", position").mean, position);
+    check(judge(runs, &Nees::orientation, name + ", orientation").mean, orientation);
+  }
 }
 
 TEST_CASE("consistency, extended: more draws of fifty runs") {

@@ -382,6 +382,30 @@ TEST_CASE("C interface: a full queue refuses and counts; other queues go on") {
   CHECK(counts.laser_overflow == 0);
 }
 
+TEST_CASE("C interface: a frame stamped at the end of time is refused, wherever the cameras' clock stands") {
+  for (const double offset : {-0.01, 0.01}) {
+    ear_calibration calibration = to_c(drive().simulation.calibration());
+    calibration.camera_time_offset = offset;
+    ear_settings settings;
+    ear_default_settings(&settings);
+    settings.frame_slots = 1;  // it must not wait for inertial samples of that time
+    ear_odometry* created = nullptr;
+    REQUIRE(ear_create(&calibration, &settings, &created, nullptr, 0) == EAR_OK);
+    const Handle odometry(created);
+    ear_stereo_frame frame = drive().c_frame(0);
+    ear_estimate estimate{};
+    for (const std::int64_t t_ns :
+         {std::numeric_limits<std::int64_t>::max(), std::numeric_limits<std::int64_t>::min()}) {
+      frame.t_ns = t_ns;
+      REQUIRE(ear_add_stereo(odometry.get(), &frame) == EAR_OK);
+      CHECK(ear_process(odometry.get(), &estimate) == EAR_NO_ESTIMATE);
+    }
+    ear_counts counts{};
+    REQUIRE(ear_counts_of(odometry.get(), &counts) == EAR_OK);
+    CHECK(counts.frames_rejected == 2);
+  }
+}
+
 TEST_CASE("C interface: what cannot be used is refused with its reason") {
   const ear_calibration good = to_c(drive().simulation.calibration());
   std::array<char, 200> message{};
@@ -405,6 +429,10 @@ TEST_CASE("C interface: what cannot be used is refused with its reason") {
   const auto fisheye_with_k3 = [](C& c, S&) { c.cameras[0].lens = EAR_LENS_EQUIDISTANT; };
   CHECK(reason_of(fisheye_with_k3).find("distortion") != std::string::npos);
   CHECK(reason_of([](C& c, S&) { c.imu_rate_hz = std::nan(""); }).find("rate of the IMU") != std::string::npos);
+  for (const double offset : {std::nan(""), 1e300, -4000.0}) {
+    const auto spoil = [offset](C& c, S&) { c.camera_time_offset = offset; };
+    CHECK(reason_of(spoil).find("camera_time_offset") != std::string::npos);
+  }
   CHECK(reason_of([](C&, S& s) { s.window = 1; }).find("filter.window") != std::string::npos);
   CHECK(reason_of([](C&, S& s) { s.frame_slots = 0; }).find("frame_slots") != std::string::npos);
   CHECK(reason_of([](C&, S& s) { s.queue_seconds = std::nan(""); }).find("queue_seconds") != std::string::npos);

@@ -1,4 +1,4 @@
-// Wheels that lie for five seconds, on feature tracks: the error stays near that of wheels that do not, and known.
+// Wheels that are wrong for five seconds, on feature tracks: the error stays near that of right ones, and known.
 #include <doctest/doctest.h>
 
 #include <Eigen/Cholesky>
@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "tests/support/simulated_run.h"
+#include "tests/support/workload.h"
 
 using namespace ear;
 
@@ -44,8 +45,11 @@ Outcome run(const std::string& sequence, const std::string& fault) {
 
 }  // namespace
 
-TEST_CASE("wheel faults: one wheel off the ground, counts that stay, wheels that slip or spin idly") {
-  for (const std::string sequence : {"flat1", "wave1"}) {
+// Measured with five seeds (821 to 825), in 60 runs: 0.99 times the error without the fault, standard deviation
+// 0.07, 1.16 in the worst; a position NEES 0.01 above the one without it, standard deviation 0.17, 0.55 in the worst.
+TEST_CASE(
+    "wheel faults: one wheel off the ground, counts that stay, wheels that slip or spin idly cost next to nothing") {
+  for (const std::string& sequence : test::workload<std::string>({"flat1", "wave1"})) {
     CAPTURE(sequence);
     const Outcome clean = run(sequence, "");
     for (const std::string fault : {"wheel_lifted.left@10+5", "wheel_lifted.right@10+5", "encoder_frozen.both@10+5",
@@ -53,8 +57,8 @@ TEST_CASE("wheel faults: one wheel off the ground, counts that stay, wheels that
       CAPTURE(fault);
       const Outcome faulty = run(sequence, fault);
       CAPTURE(faulty.nees);
-      CHECK(faulty.position < 2.0 * clean.position);
-      CHECK(faulty.nees < 3.0 + 2.0 * clean.nees);
+      CHECK(faulty.position < 1.25 * clean.position);
+      CHECK(faulty.nees < 0.7 + clean.nees);
     }
   }
 }

@@ -5,8 +5,10 @@
 #include <array>
 #include <cmath>
 #include <utility>
+#include <vector>
 
 #include "tests/support/simulated_run.h"
+#include "tests/support/workload.h"
 #include "tools/evaluation/alignment.h"
 #include "tools/experiments/sample_feed.h"
 
@@ -73,24 +75,50 @@ Errors run(const simulator::Simulation& simulation, OdometerModel model,
 
 constexpr double kDegree = M_PI / 180.0;
 
-}  // namespace
-
-TEST_CASE("wheels and lasers: on waves they do no harm to what camera and IMU know, and the slope is known") {
-  const simulator::Simulation simulation = simulate("wave1", 811, 40.0);
-  const Errors with = run(simulation, OdometerModel::terrain);
-  // Five seeds: 0.80 to 1.13 times the error without; one alone does not tell which is better.
-  CHECK(with.position < 1.3 * run(simulation, OdometerModel::none).position);
-  CHECK(with.position < 0.02);
-  CHECK(with.slope < 1.0 * kDegree);
-  CHECK(with.inside > 0.99);
-  CHECK(with.mode > 0.98);
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
 }
 
-TEST_CASE("wheels and lasers: the models differ as in the paper's Table II") {
-  const simulator::Simulation simulation = simulate("lawn", 812, 40.0);
-  const double terrain = run(simulation, OdometerModel::terrain).position;
-  CHECK(terrain < run(simulation, OdometerModel::gyro).position);
-  CHECK(terrain < run(simulation, OdometerModel::differential).position);
+}  // namespace
+
+// The bounds on medians are the mean that was measured over more seeds plus three standard deviations of a median of so
+// many, by the scatter from seed to seed.
+
+// 16 seeds: 0.66 to 1.34 times the error without, median 0.86; 12.5 mm, standard deviation 3.1 mm.
+TEST_CASE("wheels and lasers: on waves, the median error of five drives is no larger than without, the slope is known" *
+          doctest::skip(test::kStatistics)) {
+  std::vector<double> positions;
+  std::vector<double> ratios;
+  for (std::uint64_t seed = 811; seed < 816; ++seed) {
+    CAPTURE(seed);
+    const simulator::Simulation simulation = simulate("wave1", seed, 40.0);
+    const Errors with = run(simulation, OdometerModel::terrain);
+    positions.push_back(with.position);
+    ratios.push_back(with.position / run(simulation, OdometerModel::none).position);
+    CHECK(with.slope < 0.7 * kDegree);
+    CHECK(with.inside > 0.99);
+    CHECK(with.mode > 0.98);
+  }
+  CHECK(median(positions) < 0.0175);
+  CHECK(median(ratios) < 1.0);
+}
+
+// 8 seeds: 0.09 to 0.20 times the error of the gyro's model, 0.09 to 0.21 of the differential one's.
+TEST_CASE(
+    "wheels and lasers: on a lawn, the terrain's model has a quarter of the others' error, median of three drives" *
+    doctest::skip(test::kStatistics)) {
+  std::vector<double> to_gyro;
+  std::vector<double> to_differential;
+  for (std::uint64_t seed = 812; seed < 815; ++seed) {
+    const simulator::Simulation simulation = simulate("lawn", seed, 40.0);
+    const double terrain = run(simulation, OdometerModel::terrain).position;
+    to_gyro.push_back(terrain / run(simulation, OdometerModel::gyro).position);
+    to_differential.push_back(terrain / run(simulation, OdometerModel::differential).position);
+  }
+  CHECK(median(to_gyro) < 0.22);
+  CHECK(median(to_differential) < 0.25);
 }
 
 TEST_CASE("wheels and lasers: with the lens covered they carry on") {
@@ -112,30 +140,44 @@ TEST_CASE("wheels and lasers: with the lens covered from the beginning they star
   CHECK(errors.position < 0.3);
 }
 
-TEST_CASE("wheels and lasers: five seconds without a frame are bridged at 20 Hz") {
-  simulator::Options options;
-  options.sequence = "flat1";
-  options.seed = 819;
-  options.duration = 25.0;
-  const double clean = run(simulator::Simulation(options), OdometerModel::terrain).position;
-  options.faults = {simulator::parse_fault("camera_dropped@10+5")};
-  const Errors errors = run(simulator::Simulation(options), OdometerModel::terrain);
-  CHECK(errors.gap > 0.1);
-  CHECK(errors.gap < 0.25);
-  CHECK(errors.position < 0.04);
-  CHECK(errors.position < 3.0 * clean);
+// 10 seeds: 17.6 mm, standard deviation 2.9 mm; 1.09 to 2.04 times the error without the gap, 1.4 on average.
+TEST_CASE("wheels and lasers: five seconds without a frame are bridged at 20 Hz" * doctest::skip(test::kStatistics)) {
+  std::vector<double> positions;
+  std::vector<double> ratios;
+  for (std::uint64_t seed = 819; seed < 822; ++seed) {
+    CAPTURE(seed);
+    simulator::Options options;
+    options.sequence = "flat1";
+    options.seed = seed;
+    options.duration = 25.0;
+    const double clean = run(simulator::Simulation(options), OdometerModel::terrain).position;
+    options.faults = {simulator::parse_fault("camera_dropped@10+5")};
+    const Errors errors = run(simulator::Simulation(options), OdometerModel::terrain);
+    CHECK(errors.gap > 0.1);
+    CHECK(errors.gap < 0.25);
+    positions.push_back(errors.position);
+    ratios.push_back(errors.position / clean);
+  }
+  CHECK(median(positions) < 0.024);
+  CHECK(median(ratios) < 2.1);
 }
 
-TEST_CASE("wheels and lasers: at five frames a second they lose nothing") {
-  simulator::Options options;
-  options.sequence = "flat3";
-  options.seed = 820;
-  options.duration = 40.0;
-  const double fast = run(simulator::Simulation(options), OdometerModel::terrain).position;
-  options.camera_rate_hz = 5.0;
-  const double slow = run(simulator::Simulation(options), OdometerModel::terrain).position;
-  CHECK(slow < 0.04);
-  CHECK(slow < 2.0 * fast);
+// 10 seeds: 13.5 mm, standard deviation 2.6 mm, against 10.3 mm, standard deviation 1.9 mm, at 30 frames a second.
+TEST_CASE("wheels and lasers: at five frames a second the median error of five drives is less than twice that at 30" *
+          doctest::skip(test::kStatistics)) {
+  std::vector<double> fast;
+  std::vector<double> slow;
+  for (std::uint64_t seed = 820; seed < 825; ++seed) {
+    simulator::Options options;
+    options.sequence = "flat3";
+    options.seed = seed;
+    options.duration = 40.0;
+    fast.push_back(run(simulator::Simulation(options), OdometerModel::terrain).position);
+    options.camera_rate_hz = 5.0;
+    slow.push_back(run(simulator::Simulation(options), OdometerModel::terrain).position);
+  }
+  CHECK(median(slow) < 0.0175);
+  CHECK(median(slow) < 1.9 * median(fast));
 }
 
 TEST_CASE("wheels and lasers: a body that swings on standing wheels does not move them") {

@@ -151,6 +151,8 @@ TEST_CASE("recording: a first row that is malformed is an error with file, line 
 
   write_text(csv, imu_rows("1.5,0,0,0,0,0,9.8\n"));
   CHECK(contains(error(), "imu0/data.csv:2: timestamp: '1.5' is not a whole number of nanoseconds"));
+  write_text(csv, imu_rows("9223372036854775807,0,0,0,0,0,9.8\n"));
+  CHECK(contains(error(), "imu0/data.csv:2: timestamp: '9223372036854775807' is not within 142 years of the clock's"));
   write_text(csv, imu_rows("1,0,0,0,0,up,9.8\n"));
   CHECK(contains(error(), "imu0/data.csv:2: a_y: 'up' is not a number"));
   write_text(csv, imu_rows("1,0,0,0,0,0\n"));
@@ -203,6 +205,14 @@ TEST_CASE("recording: what it survives is left out, counted, and located") {
     CHECK(all.imu.size() == 3);
     CHECK(only_warning(all).kind == "imu0: backward stamp");
     CHECK(contains(only_warning(all).first, "imu0/data.csv:4: timestamp"));
+  }
+  SUBCASE("stamps that are no times") {
+    write_text(csv,
+               imu_rows(good1 + "-9223372036854775808,0,0,0,0,0,9.8\n4500000000000000000,0,0,0,0,0,9.8\n" + good2));
+    const Contents all = read_all(folder.path());
+    CHECK(all.imu.size() == 2);
+    CHECK(only_warning(all).kind == "imu0: malformed line");
+    CHECK(only_warning(all).count == 2);
   }
   SUBCASE("one stamp far too late costs one sample, not all that follow") {
     write_text(csv, imu_rows(good1 + "99999,0,0,0,0,0,9.8\n" + good2 + "30,0,0,0,0,0,9.8\n"));

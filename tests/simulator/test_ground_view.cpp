@@ -46,14 +46,6 @@ double error_px(const Terrain& terrain, const Ray& ray, double focal, double dep
   return error;
 }
 
-Eigen::Isometry3d pose_WC(const Trajectory& trajectory, double t, const ear::CameraCalibration& camera) {
-  const Kinematics motion = trajectory.at(t);
-  Eigen::Isometry3d T_WB = Eigen::Isometry3d::Identity();
-  T_WB.linear() = motion.R_WB;
-  T_WB.translation() = motion.p_WB;
-  return T_WB * camera.T_BC;
-}
-
 // A place of the ground on its texture, which is mirrored at each border.
 double folded(double place, double size) {
   const double in_pair = place - 2.0 * size * std::floor(place / (2.0 * size));

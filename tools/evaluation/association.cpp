@@ -1,6 +1,7 @@
 #include "tools/evaluation/association.h"
 
 #include <algorithm>
+#include <limits>
 
 namespace ear::evaluation {
 namespace {
@@ -24,7 +25,8 @@ TimeNs gap_limit(const Trajectory& trajectory) {
   for (std::size_t i = 1; i < trajectory.size(); ++i) intervals.push_back(trajectory[i].t_ns - trajectory[i - 1].t_ns);
   const auto middle = intervals.begin() + static_cast<std::ptrdiff_t>(intervals.size() / 2);
   std::nth_element(intervals.begin(), middle, intervals.end());
-  return std::max(kShortestGap, 3 * *middle);
+  constexpr TimeNs kLongestGap = std::numeric_limits<TimeNs>::max() / 3;
+  return std::max(kShortestGap, 3 * std::min(*middle, kLongestGap));
 }
 
 Pose interpolate(const Pose& a, const Pose& b, TimeNs t_ns) {
