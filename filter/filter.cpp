@@ -51,7 +51,7 @@ std::optional<Estimate> Filter::process(const FeatureFrame& given) {
     } else {
       sources_.go_without_image(advice, ekf_, records_);
     }
-    watch_biases();
+    watch_biases(true);
   }
   if (use_image) sources_.cameras().remember(frame, ekf_);
   return report(true, seen);
@@ -63,7 +63,7 @@ std::optional<Estimate> Filter::process_without_image(TimeNs t_ns) {
   propagate_to(FeatureFrame{t_ns, {}});
   if (ekf_.running()) {
     sources_.go_without_image(advise(consistency_, health_.health(), config_.anomaly), ekf_, records_);
-    watch_biases();
+    watch_biases(false);
   }
   return report(false, FrameAgreement{});
 }
@@ -86,9 +86,9 @@ void Filter::propagate_to(const FeatureFrame& frame) {
 }
 
 /// A bias that jumped is as little known as at the start, and took the motion along until it was found out.
-void Filter::watch_biases() {
+void Filter::watch_biases(bool image) {
   const TimeNs t_ns = ekf_.state().imu.t_ns;
-  const BiasJump jumped = bias_watch_.judge(ekf_.take_bias_changes(), t_ns);
+  const BiasJump jumped = bias_watch_.judge(ekf_.take_bias_changes(), t_ns, image);
   if (!jumped.any()) return;
   const double gyro = jumped.gyro ? config_.prior.gyro_bias : 0.0;
   const double accel = jumped.accel ? config_.prior.accel_bias : 0.0;

@@ -5,13 +5,14 @@
 namespace ear {
 namespace {
 
-constexpr double kMemory = 0.5;          // [s]
-constexpr double kSigmas = 6.0;          // of the sum of the corrections: these do not happen by chance,
-constexpr double kSigmasOfImages = 5.0;  // nor these, with images alone
+constexpr double kMemory = 0.5;                // [s]
+constexpr double kSigmas = 6.0;                // of the sum of the corrections: these do not happen by chance,
+constexpr double kSigmasOfImages = 5.0;        // nor these, with images alone;
+constexpr double kSigmasWithoutImages = 12.0;  // measured on wheels of real robots, docs/filter.md
 
 }  // namespace
 
-BiasJump BiasWatch::judge(const BiasChanges& changes, TimeNs t_ns) {
+BiasJump BiasWatch::judge(const BiasChanges& changes, TimeNs t_ns, bool image) {
   if (changes.restarted) all_ = by_images_ = BiasChange{};
   all_.add(changes.all.correction, changes.all.variance_lowered);
   by_images_.add(changes.by_images.correction, changes.by_images.variance_lowered);
@@ -21,7 +22,7 @@ BiasJump BiasWatch::judge(const BiasChanges& changes, TimeNs t_ns) {
     jumped.gyro = jumped.gyro || ratio.head<3>().maxCoeff() > sigmas * sigmas;
     jumped.accel = jumped.accel || ratio.tail<3>().maxCoeff() > sigmas * sigmas;
   };
-  judge_by(all_, kSigmas);
+  judge_by(all_, image ? kSigmas : kSigmasWithoutImages);
   judge_by(by_images_, kSigmasOfImages);
   const double kept = std::exp(-seconds_between(judged_ns_, t_ns) / kMemory);
   judged_ns_ = t_ns;

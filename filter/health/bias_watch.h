@@ -17,9 +17,10 @@ struct BiasJump {
 
 class BiasWatch {
  public:
-  /// What all updates since the last call did, the state now being at `t_ns`. What speaks for a jump is forgotten when
-  /// it was reported. Updates by images count sooner: wheels that leave the ground unnoticed mislead.
-  BiasJump judge(const BiasChanges& changes, TimeNs t_ns);
+  /// What all updates since the last call did, the state now being at `t_ns`, with an image (`image`) or without: then
+  /// it takes more, for wheels that slip for long look like a bias that jumped. What speaks for a jump is forgotten
+  /// when it was reported. Updates by images count sooner: wheels that leave the ground unnoticed mislead.
+  BiasJump judge(const BiasChanges& changes, TimeNs t_ns, bool image);
 
  private:
   BiasChange all_, by_images_;

@@ -37,7 +37,7 @@ class Tracker {
       variance_(i) -= lowered(i);
     }
     t_ns_ += kStep;
-    return watch_.judge(changes_by(correction, lowered, true), t_ns_);
+    return watch_.judge(changes_by(correction, lowered, true), t_ns_, true);
   }
 
  private:
@@ -88,8 +88,8 @@ TEST_CASE("bias_watch: what was reported is not reported again") {
   BiasWatch watch;
   Vector6 correction = Vector6::Zero();
   correction(0) = 1.0;
-  CHECK(watch.judge(changes_by(correction, Vector6::Constant(1e-4), false), kStep).gyro);
-  CHECK_FALSE(watch.judge(BiasChanges{}, 2 * kStep).gyro);
+  CHECK(watch.judge(changes_by(correction, Vector6::Constant(1e-4), false), kStep, true).gyro);
+  CHECK_FALSE(watch.judge(BiasChanges{}, 2 * kStep, true).gyro);
 }
 
 TEST_CASE("bias_watch: what another source misled does not count") {
@@ -97,10 +97,21 @@ TEST_CASE("bias_watch: what another source misled does not count") {
   Vector6 correction = Vector6::Zero();
   correction(0) = 0.03;  // three standard deviations
   const BiasChanges little = changes_by(correction, Vector6::Constant(1e-4), false);
-  CHECK_FALSE(watch.judge(little, kStep).gyro);
+  CHECK_FALSE(watch.judge(little, kStep, true).gyro);
   BiasChanges restarted;
   restarted.restarted = true;
-  CHECK_FALSE(watch.judge(restarted, 2 * kStep).gyro);
+  CHECK_FALSE(watch.judge(restarted, 2 * kStep, true).gyro);
   correction(0) = 0.06 * 1.05;  // just over six, alone; with the first part it would be as much too
-  CHECK(watch.judge(changes_by(correction, Vector6::Constant(1e-4), false), 3 * kStep).gyro);
+  CHECK(watch.judge(changes_by(correction, Vector6::Constant(1e-4), false), 3 * kStep, true).gyro);
+}
+
+TEST_CASE("bias_watch: without an image it takes twice as much") {
+  for (const bool image : {true, false}) {
+    BiasWatch watch;
+    Vector6 correction = Vector6::Zero();
+    correction(0) = 0.1;  // ten standard deviations
+    CHECK(watch.judge(changes_by(correction, Vector6::Constant(1e-4), false), kStep, image).gyro == image);
+    correction(0) = 0.13;
+    CHECK(watch.judge(changes_by(correction, Vector6::Constant(1e-4), false), 100 * kStep, image).gyro);
+  }
 }
