@@ -1,0 +1,37 @@
+"""Does structure.py count members and functions as a reader would?"""
+
+import unittest
+
+import structure
+
+TEXT = """
+class Small final : public Base {
+ public:
+  explicit Small(int a) : a_(a) {}
+  [[nodiscard]] int sum() const { return a_ + b_; }
+  void set(int a, int b = 3);  // a_; in a comment
+  using Row = std::array<int, 3>;
+  static constexpr int kMost = 3;
+
+ private:
+  struct Inner {
+    int x = 0;
+    int y = 0;
+  };
+  int a_ = 0, b_ = 0;
+  std::map<int, Inner> inner_;
+  std::vector<int> rows_{};
+};
+"""
+
+
+class Structure(unittest.TestCase):
+    def test_counts(self):
+        text = structure.without_comments(TEXT)
+        match = structure.CLASS.search(text)
+        self.assertEqual(match[1], "Small")
+        self.assertEqual(structure.measure(structure.body_from(text, match.end() - 1)), (4, 3))
+
+
+if __name__ == "__main__":
+    unittest.main()
