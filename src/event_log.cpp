@@ -1,6 +1,7 @@
 #include "src/event_log.h"
 
 #include <array>
+#include <cmath>
 #include <cstdio>
 
 #include "src/health_text.h"
@@ -47,17 +48,21 @@ void EventLog::note_unusable(TimeNs t_ns, const std::string& reason) {
   warn(t_ns, "unusable images", "images not used: " + reason);
 }
 
+/// A state that was written within the interval waits, so that one that comes and goes does not fill the log; the state
+/// that stays is written in the end.
 void EventLog::note_health(TimeNs t_ns, const Health& health) {
-  const bool same = health.status == health_.status && health.faulty == health_.faulty &&
-                    health.load_step == health_.load_step && health.reset_counter == health_.reset_counter;
-  const bool lost = health.status == HealthStatus::lost && health_.status != HealthStatus::lost;
-  health_ = health;
+  const bool same = health.status == written_.status && health.faulty == written_.faulty &&
+                    health.load_step == written_.load_step && health.reset_counter == written_.reset_counter;
   if (same) return;
   const std::string text = to_text(health);
-  if (lost) {
-    warn(t_ns, "lost", "lost: no estimate until it has started again");
-  } else if (const auto held_back = limit_.allows(text, t_ns)) {
-    log_info(at(t_ns) + text + held_back_text(*held_back));
+  const auto before = states_.find(text);
+  if (before != states_.end() && std::abs(seconds_between(before->second, t_ns)) < kInterval) return;
+  states_[text] = t_ns;
+  written_ = health;
+  if (health.status == HealthStatus::lost) {
+    log_warning(at(t_ns) + "lost: no estimate until it has started again");
+  } else {
+    log_info(at(t_ns) + text);
   }
 }
 

@@ -1,6 +1,7 @@
 // What class Odometry has to say for people: when its state of health changes, and what it does not use.
 #pragma once
 
+#include <map>
 #include <string>
 
 #include "ear/estimate.h"
@@ -23,9 +24,12 @@ class EventLog {
   void note_refused(TimeNs t_ns, const char* stream, const StreamCounts& before, const StreamCounts& now);
   void warn(TimeNs t_ns, const std::string& kind, const std::string& message);
 
-  Health health_;
+  static constexpr double kInterval = 10.0;  // [s]
+
+  Health written_;
+  std::map<std::string, TimeNs> states_;  // when each was written last
   InputCounts counts_;
-  RepeatLimit limit_{10.0};
+  RepeatLimit limit_{kInterval};
 };
 
 }  // namespace ear

@@ -113,9 +113,11 @@ TEST_CASE("event log: each change of the health once, lost as a warning") {
   CHECK(contains(note(3.0), "warning: at 3.000 s: lost"));
   CHECK(note(3.1).empty());
   health.status = HealthStatus::tracking;
-  CHECK(note(4.0).empty());  // the same as 3 s before
+  CHECK(note(4.0).empty());  // was written 3 s before
+  CHECK(note(10.9).empty());
+  CHECK(note(11.1) == "info: at 11.100 s: tracking\n");  // but it lasts
   health.load_step = 2;
-  CHECK(contains(note(4.1), "load step 2"));
+  CHECK(contains(note(11.2), "load step 2"));
 }
 
 TEST_CASE("event log: what is refused is a warning, every ten seconds") {
