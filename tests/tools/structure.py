@@ -62,9 +62,9 @@ def measure(body):
             continue
         if "= delete" in statement or "= default" in statement or statement.startswith("static constexpr"):
             continue
-        initialised = re.split(r"=|\{", statement, maxsplit=1)[0]
-        if re.search(r"\w+_\s*(?:,\s*\w+_\s*)*$", initialised.strip()) and "(" not in initialised:
-            members += 1 + initialised.count(",") * (0 if "<" in initialised else 1)
+        names = re.findall(r"\b\w+_\s*(?=[={,]|$)", statement)
+        if names and "(" not in statement.split(names[0])[0]:
+            members += len(names)
         elif "(" in statement:
             functions += 1
     return members, functions
