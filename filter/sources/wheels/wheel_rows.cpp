@@ -24,13 +24,13 @@ WheelRows linearize_wheels(const State& x, const Eigen::Matrix3d& R_WB, const Ei
   const Vector3d v_O = R_WB.transpose() * v_W + rate.cross(odometer.T_BO.p);
   const Vector3d y = R_BO.col(1);
   const Vector3d n = on_plane ? Vector3d(R_WB.transpose() * x.ground.n_W) : Vector3d(R_BO.col(2));
-  const Vector3d along = y.cross(n);
+  const Vector3d along = y.cross(n);  // (6)-(8)
   const Vector3d f = along.normalized();
   const Eigen::Vector2d wheel = odometer.wheel_radius.cwiseProduct(turn.angle) / turn.duration();  // rim speeds
   const double r = odometer.wheel_radius.mean();
 
   WheelRows rows;
-  rows.wheel_speed = wheel.mean() + (terrain ? r * y.dot(rate) : 0.0);
+  rows.wheel_speed = wheel.mean() + (terrain ? r * y.dot(rate) : 0.0);  // (5)
   const double turning = (wheel(1) - wheel(0)) / odometer.track_width;
   rows.residual << rows.wheel_speed - f.dot(v_O), -y.dot(v_O), -n.dot(v_O), turning - n.dot(rate);
 
