@@ -64,11 +64,9 @@ class WatchedFilter final : public Estimator {
   void refuse_frame() override { filter_.refuse_frame(); }
   void set_window(int clones) override { filter_.set_window(clones); }
   [[nodiscard]] InputCounts input_counts() const override { return filter_.input_counts(); }
-  [[nodiscard]] bool covers(TimeNs t_ns) const override { return filter_.covers(t_ns); }
-  [[nodiscard]] bool is_next(TimeNs t_ns) const override { return filter_.is_next(t_ns); }
+  [[nodiscard]] FrameStamp check_stamp(TimeNs t_ns) const override { return filter_.check_stamp(t_ns); }
   [[nodiscard]] TimeNs camera_time(TimeNs t_ns) const override { return filter_.camera_time(t_ns); }
-  [[nodiscard]] CameraState cameras() const override { return filter_.cameras(); }
-  [[nodiscard]] OdometerState odometer() const override { return filter_.odometer(); }
+  [[nodiscard]] CalibrationState calibration() const override { return filter_.calibration(); }
 
  private:
   Filter filter_;
