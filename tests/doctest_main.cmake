@@ -12,7 +12,7 @@ function(ear_register target name label timeout)
     math(EXPR timeout "10 * ${timeout}")  # emulated, or with all checks
   endif()
   get_filename_component(folder ${CMAKE_CURRENT_SOURCE_DIR} NAME)
-  if(label STREQUAL unit AND folder IN_LIST EAR_SANITIZED_FOLDERS)
+  if("${label}" STREQUAL "unit" AND folder IN_LIST EAR_SANITIZED_FOLDERS)  # quoted: loops have a variable `unit`
     add_dependencies(sanitized_tests ${target})
     list(APPEND label sanitized)
   endif()
