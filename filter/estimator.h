@@ -40,6 +40,9 @@ enum class FrameStamp : std::uint8_t {
   no_samples,  ///< no inertial samples reach (nearly) up to it
 };
 
+/// How far Estimator::predict goes beyond the newest inertial sample [s], chosen.
+inline constexpr double kLongestPredict = 0.5;
+
 /// Meanings, and what is refused: class Filter.
 class Estimator {
  public:

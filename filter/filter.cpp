@@ -11,8 +11,7 @@
 namespace ear {
 namespace {
 
-constexpr double kLongestPredict = 0.5;  // [s] chosen: beyond the newest sample
-constexpr double kJumpNoticed = 0.3;     // [s] chosen: until a bias that jumped is found out
+constexpr double kJumpNoticed = 0.3;  // [s] chosen: until a bias that jumped is found out
 
 }  // namespace
 
@@ -78,23 +77,9 @@ void Filter::propagate_to(const FeatureFrame& frame) {
     consistency_ = consistency_check_(sources_.displacements(frame, t_ns, ingest_, ekf_));
     sources_.advance(t_ns, advise(consistency_, health_.health(), config_.anomaly), ingest_, ekf_, records_);
   }
-  if (!ekf_.running() || health_.lost()) {
-    start(frame);
-  } else {
-    start_.forget_frames();
-  }
-}
-
-/// A bias that jumped is as little known as at the start, and took the motion along until it was found out.
-void Filter::watch_biases(bool image) {
-  const TimeNs t_ns = ekf_.state().imu.t_ns;
-  const BiasJump jumped = bias_watch_.judge(ekf_.take_bias_changes(), t_ns, image);
-  if (!jumped.any()) return;
-  const double gyro = jumped.gyro ? config_.prior.gyro_bias : 0.0;
-  const double accel = jumped.accel ? config_.prior.accel_bias : 0.0;
-  ekf_.inflate_motion(gyro * kJumpNoticed, accel * kJumpNoticed, 0.5 * accel * kJumpNoticed * kJumpNoticed);
-  ekf_.inflate_biases(gyro, accel);
-  health_.report_imu_fault(jumped.gyro, jumped.accel, t_ns);
+  consistency_ = consistency_check_(sources_.displacements(frame, t_ns, ingest_, ekf_, sources_.ground().known()));
+  sources_.advance(t_ns, advise(consistency_, health_.health(), config_.anomaly), ingest_, ekf_, records_);
+  start_again(frame);
 }
 
 /// What is given away of the state, and whether it is.
@@ -102,7 +87,7 @@ std::optional<Estimate> Filter::report(bool image, const FrameAgreement& agreeme
   std::optional<Estimate> estimate;
   const double scale_sigma = start_.scale_is_given() ? config_.prior.wheel_scale : 0.0;
   if (ekf_.running()) {
-    estimate = make_estimate(ekf_, sources_.ground(), alignment_, scale_sigma, records_, consistency_);
+    estimate = make_estimate(ekf_, sources_.ground().known(), alignment_, scale_sigma, records_, consistency_);
   }
   const TimeNs t_ns = imu_time(*last_frame_ns_, ekf_.state().camera);
   HealthMonitor::Frame frame = health_frame(t_ns, ekf_, sources_, agreement, records_, estimate);
@@ -247,22 +232,7 @@ Status Filter::status() const {
 }
 
 std::optional<RelativeMotion> Filter::motion_to(TimeNs t_ns) const {
-  const std::optional<LastImage>& last = sources_.cameras().last_image();
-  if (!is_time(t_ns) || !last || ingest_.imu().empty() || t_ns <= last->t_ns) return std::nullopt;
-  const CameraState& camera = ekf_.state().camera;
-  const TimeNs to_ns = imu_time(t_ns, camera);
-  if (ekf_.running()) {
-    return motion_between(sources_.cameras().image_pose(ekf_.state()),
-                          nav_state(integrate_to(to_ns, ekf_.state().imu, ingest_.imu())));
-  }
-  RelativeMotion motion;
-  if (const std::optional<Eigen::Vector3d> path = start_.path_to(to_ns)) {
-    motion.p_B0B1 = *path;
-    motion.translation_known = true;
-  }
-  const TimeNs from_ns = imu_time(last->t_ns, camera);
-  motion.R_B1B0 = gyro_rotation(from_ns, to_ns, Eigen::Vector3d::Zero(), ingest_.imu()).transpose();
-  return motion;
+  return motion_since_image(t_ns, ekf_, sources_, start_, ingest_);
 }
 
 std::optional<NavState> Filter::predict(TimeNs t_ns) const {

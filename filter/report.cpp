@@ -19,7 +19,7 @@ Records records_for(const FeatureFrame& frame, const Records& before, bool on_gr
   return records;
 }
 
-Estimate make_estimate(const Ekf& ekf, const Ground& ground, const MapAlignment& alignment, double scale_sigma,
+Estimate make_estimate(const Ekf& ekf, bool ground_known, const MapAlignment& alignment, double scale_sigma,
                        const Records& records, const Consistency& consistency) {
   const State& x = ekf.state();
   Estimate estimate;
@@ -28,7 +28,7 @@ Estimate make_estimate(const Ekf& ekf, const Ground& ground, const MapAlignment&
   estimate.covariance = alignment.to_world(ekf.ordinary_covariance(scale_sigma), here);
   estimate.frame = records.statistics;
   estimate.consistency = consistency;
-  if (ground.known()) {
+  if (ground_known) {
     const Slope seen = slope(x.imu.R_WB * x.odometer.T_BO.R.col(1), x.ground.n_W);  // (4)
     const std::array<int, 5> entries = {err::theta, err::theta + 1, err::theta + 2, err::normal, err::normal + 1};
     const Eigen::Matrix<double, 5, 5> P = ekf.covariance().matrix()(entries, entries);
@@ -36,6 +36,26 @@ Estimate make_estimate(const Ekf& ekf, const Ground& ground, const MapAlignment&
     estimate.terrain = {true, seen.along, seen.across, std::sqrt(P_slope(0, 0)), std::sqrt(P_slope(1, 1))};
   }
   return estimate;
+}
+
+std::optional<RelativeMotion> motion_since_image(TimeNs t_ns, const Ekf& ekf, const Sources& sources,
+                                                 const Start& start, const Ingest& ingest) {
+  const std::optional<LastImage>& last = sources.cameras().last_image();
+  if (!is_time(t_ns) || !last || ingest.imu().empty() || t_ns <= last->t_ns) return std::nullopt;
+  const CameraState& camera = ekf.state().camera;
+  const TimeNs to_ns = imu_time(t_ns, camera);
+  if (ekf.running()) {
+    return motion_between(sources.cameras().image_pose(ekf.state()),
+                          nav_state(integrate_to(to_ns, ekf.state().imu, ingest.imu())));
+  }
+  RelativeMotion motion;
+  if (const std::optional<Eigen::Vector3d> path = start.path_to(to_ns)) {
+    motion.p_B0B1 = *path;
+    motion.translation_known = true;
+  }
+  const TimeNs from_ns = imu_time(last->t_ns, camera);
+  motion.R_B1B0 = gyro_rotation(from_ns, to_ns, Eigen::Vector3d::Zero(), ingest.imu()).transpose();
+  return motion;
 }
 
 HealthMonitor::Frame health_frame(TimeNs t_ns, const Ekf& ekf, const Sources& sources, const FrameAgreement& agreement,

@@ -34,6 +34,13 @@ void Ekf::start(const ImuState& x, const Eigen::VectorXd& sigma, bool scale_is_g
   covariance_.update(mean_is_known, err::wheel_radius, Eigen::Matrix<double, 1, 1>::Zero());
 }
 
+void Ekf::assume(const State& x, const Eigen::Ref<const Eigen::MatrixXd>& P) {
+  running_ = true;
+  state_ = x;
+  covariance_.reset(Eigen::VectorXd::Zero(P.rows()));
+  covariance_.inflate(0, P);
+}
+
 void Ekf::reset() {
   running_ = false;
   state_.imu = ImuState{};

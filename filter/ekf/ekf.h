@@ -40,6 +40,8 @@ class Ekf {
   /// Begins at `x`, with these standard deviations of the whole error vector. `scale_is_given`: the mean of both wheel
   /// radii is taken for known.
   void start(const ImuState& x, const Eigen::VectorXd& sigma, bool scale_is_given = false);
+  /// The state is this one, whose error has covariance `P`; without clones: what another estimator found.
+  void assume(const State& x, const Eigen::Ref<const Eigen::MatrixXd>& P);
   /// Nothing of the state is used any more.
   void reset();
   /// Is there a state?

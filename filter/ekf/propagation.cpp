@@ -37,6 +37,7 @@ BodyMotion motion_at(TimeNs t_ns, const ImuState& x, const ImuBuffer& samples) {
 }
 
 Eigen::Matrix3d gyro_rotation(TimeNs from_ns, TimeNs to_ns, const Eigen::Vector3d& b_g, const ImuBuffer& samples) {
+  if (to_ns < from_ns) return gyro_rotation(to_ns, from_ns, b_g, samples).transpose();
   Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
   samples.for_each_piece(from_ns, to_ns, [&](const Eigen::Vector3d& gyro_B, const Eigen::Vector3d&, double dt) {
     R *= exp_so3((gyro_B - b_g) * dt);

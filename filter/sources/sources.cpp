@@ -41,13 +41,14 @@ void Sources::look_at(const FeatureFrame& frame, TimeNs t_ns, const Ingest& inge
   ground_.set_gyro_bias(ekf.state().imu.b_g);
 }
 
-Displacements Sources::displacements(const FeatureFrame& frame, TimeNs t_ns, const Ingest& ingest, const Ekf& ekf) {
+Displacements Sources::displacements(const FeatureFrame& frame, TimeNs t_ns, const Ingest& ingest, const Ekf& ekf,
+                                     bool ground_known) {
   const ImuMotion motion = imu_motion(ekf.state().imu, ingest.imu(), t_ns, imu_);
   Displacements result;
   result[index_of(MotionSensor::imu)] = imu_displacement(motion, ekf.covariance());
   if (wheels_ && on_ground() && ground_.rolls_at(ekf.state().imu.t_ns)) {
     result[index_of(MotionSensor::odometer)] =
-        wheels_->displacement(ekf, ingest.increments(), ingest.imu(), t_ns, ground_.known());
+        wheels_->displacement(ekf, ingest.increments(), ingest.imu(), t_ns, ground_known);
   }
   result[index_of(MotionSensor::camera)] = cameras_.displacement(frame, t_ns, motion, ekf);
   return result;

@@ -24,16 +24,24 @@ class Sources {
   /// Every sample, in time order: do the wheels leave the ground, or meet it? A take-off is noticed some centimetres
   /// above the ground, and until then the wheels held the vehicle there.
   template <typename Sample>
-  void watch_contact(const Sample& sample, Ekf& ekf) {
-    if (wheels_ && ground_.add(sample) == ContactEvent::takeoff && ekf.running()) inflate_after_takeoff(ekf);
+  ContactEvent watch_contact(const Sample& sample, Ekf& ekf) {
+    const ContactEvent event = wheels_ ? ground_.add(sample) : ContactEvent::none;
+    if (event == ContactEvent::takeoff && ekf.running()) inflate_after_takeoff(ekf);
+    return event;
   }
 
   /// A frame at `t_ns` (IMU time), before anything is done with it: how exact it is, and whether the vehicle stands.
   void look_at(const FeatureFrame& frame, TimeNs t_ns, const Ingest& ingest, const Ekf& ekf);
-  /// p^I, p^o and p^c of (13), from the state to `t_ns`, each by one sensor alone.
+  /// p^I, p^o and p^c of (13), from the state to `t_ns`, each by one sensor alone. `ground_known`: the state's normal
+  /// is one that the lasers have seen.
   [[nodiscard]] Displacements displacements(const FeatureFrame& frame, TimeNs t_ns, const Ingest& ingest,
+<<<<<<< HEAD
                                             const Ekf& ekf);
   /// Propagates to `t_ns`, with wheels (5)-(8) and lasers (2)-(4) in between: each at its own time, or, if the state
+=======
+                                            const Ekf& ekf, bool ground_known);
+  /// Propagates to `t_ns`, with wheels (5)-(8) and lasers (2)-(4) on the way: each at its own time, or, if the state
+>>>>>>> c6957bd
   /// has passed that already, where the state was then.
   void advance(TimeNs t_ns, const Advice& advice, Ingest& ingest, Ekf& ekf, Records& records);
   /// The same without wheels and lasers.

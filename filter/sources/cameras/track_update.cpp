@@ -9,7 +9,6 @@ namespace ear {
 namespace {
 
 constexpr double kNegligible = 1e-4;  // measured, docs/performance.md: 2e-4 of a frame's information, 12 % of the rows
-constexpr std::size_t kMinObservations = 2;  // clones that must have seen a feature: fewer show no parallax
 
 int clone_index(const State& x, std::uint64_t frame) {
   const auto clone = std::lower_bound(x.clones.begin(), x.clones.end(), frame,

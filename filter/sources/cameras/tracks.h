@@ -17,6 +17,9 @@ struct TrackObservation {
   bool has_right = false;
 };
 
+/// Clones that must have seen a feature: fewer show no parallax.
+inline constexpr std::size_t kMinObservations = 2;
+
 struct Track {
   std::uint64_t id = 0;
   std::vector<TrackObservation> observations;  ///< oldest first
