@@ -35,13 +35,8 @@ class Sources {
   /// p^I, p^o and p^c of (13), from the state to `t_ns`, each by one sensor alone. `ground_known`: the state's normal
   /// is one that the lasers have seen.
   [[nodiscard]] Displacements displacements(const FeatureFrame& frame, TimeNs t_ns, const Ingest& ingest,
-<<<<<<< HEAD
-                                            const Ekf& ekf);
-  /// Propagates to `t_ns`, with wheels (5)-(8) and lasers (2)-(4) in between: each at its own time, or, if the state
-=======
                                             const Ekf& ekf, bool ground_known);
   /// Propagates to `t_ns`, with wheels (5)-(8) and lasers (2)-(4) on the way: each at its own time, or, if the state
->>>>>>> c6957bd
   /// has passed that already, where the state was then.
   void advance(TimeNs t_ns, const Advice& advice, Ingest& ingest, Ekf& ekf, Records& records);
   /// The same without wheels and lasers.
