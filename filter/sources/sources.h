@@ -36,7 +36,7 @@ class Sources {
   /// is one that the lasers have seen.
   [[nodiscard]] Displacements displacements(const FeatureFrame& frame, TimeNs t_ns, const Ingest& ingest,
                                             const Ekf& ekf, bool ground_known);
-  /// Propagates to `t_ns`, with wheels (5)-(8) and lasers (2)-(4) on the way: each at its own time, or, if the state
+  /// Propagates to `t_ns`, with wheels (5)-(8) and lasers (2)-(4) in between: each at its own time, or, if the state
   /// has passed that already, where the state was then.
   void advance(TimeNs t_ns, const Advice& advice, Ingest& ingest, Ekf& ekf, Records& records);
   /// The same without wheels and lasers.
