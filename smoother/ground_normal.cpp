@@ -19,9 +19,8 @@ void GroundNormal::move(const Eigen::Matrix3d& R_B0B1, double distance) {
   P_.diagonal().array() += config_.normal_walk * config_.normal_walk * std::abs(distance);
 }
 
-bool GroundNormal::add(const std::array<double, kMaxBeams>& range, const OdometerState& odometer) {
-  used_ = 0;
-  rejected_ = 0;
+bool GroundNormal::add(const BeamRanges& ranges, const OdometerState& odometer, Records& records) {
+  const std::array<double, kMaxBeams>& range = ranges.range;
   if (!known_) {
     const Eigen::Vector3d hits(range[0], range[1], range[2]);
     const std::optional<GroundPlane> plane = plane_through_hits(lasers_.beams, hits, odometer.T_BO.p);
@@ -37,17 +36,26 @@ bool GroundNormal::add(const std::array<double, kMaxBeams>& range, const Odomete
   Eigen::Matrix2d A = Eigen::Matrix2d::Zero();  // of the reading alone
   Eigen::Vector2d b = Eigen::Vector2d::Zero();
   const auto take = [&](double residual, const Eigen::RowVector2d& h, double sigma) {
-    const double variance = (h * P_ * h.transpose()).value() + sigma * sigma;
-    if (!gate_.fits(residual, variance)) return false;
-    A += h.transpose() * h / (sigma * sigma);
-    b += h.transpose() * residual / (sigma * sigma);
-    return true;
+    Innovation innovation;
+    innovation.value = residual;
+    innovation.variance = (h * P_ * h.transpose()).value() + sigma * sigma;
+    innovation.gate = gate_.quantile(1);
+    innovation.fits = gate_.fits(residual, innovation.variance);
+    if (innovation.fits) {
+      A += h.transpose() * h / (sigma * sigma);
+      b += h.transpose() * residual / (sigma * sigma);
+    }
+    return innovation;
   };
+  int used = 0;
   const double sigma = std::hypot(lasers_.noise, config_.unevenness);
   for (std::size_t i = 0; i < lasers_.beams.size(); ++i) {
     if (!(range[i] >= lasers_.range_min && range[i] <= lasers_.range_max)) continue;
     const BeamPrediction z = predict_range(x, I, i, lasers_.beams[i].p_BL);
-    ++(take(range[i] - z.range, z.H_normal, sigma) ? used_ : rejected_);
+    const Innovation innovation = take(range[i] - z.range, z.H_normal, sigma);
+    records.log.add(beam_source(i), innovation, ranges.t_ns);
+    ++(innovation.fits ? records.statistics.beams_used : records.statistics.beams_rejected);
+    used += innovation.fits ? 1 : 0;
   }
   const AxlePrediction axle = predict_axle(x, I);
   take(-axle.lean, axle.H_normal, std::sqrt(2.0) * config_.unevenness / odometer.track_width);
@@ -59,7 +67,7 @@ bool GroundNormal::add(const std::array<double, kMaxBeams>& range, const Odomete
   const Eigen::Matrix<double, 3, 2> B0 = tangent_basis(n_B_);
   n_B_ = (exp_so3(B0 * correction) * n_B_).normalized();
   P_ = 0.5 * (P + P.transpose());
-  return used_ > 0;
+  return used > 0;
 }
 
 }  // namespace ear::smoother

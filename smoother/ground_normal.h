@@ -3,12 +3,13 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 
 #include "ear/calibration.h"
 #include "ear/filter_config.h"
 #include "filter/ekf/gate.h"
+#include "filter/ekf/records.h"
 #include "filter/ekf/state.h"
+#include "filter/ingest/beam_ranges.h"
 
 namespace ear::smoother {
 
@@ -22,19 +23,17 @@ class GroundNormal {
   /// The body turned by R_B0B1 while the wheels rolled so far [m].
   void move(const Eigen::Matrix3d& R_B0B1, double distance);
 
-  /// One range per beam [m], NaN without return, of beams that hang on the body as in `odometer`. Each is gated by
-  /// itself; where nothing is known, the plane through the hits is the start. Did it tell anything?
-  bool add(const std::array<double, kMaxBeams>& range, const OdometerState& odometer);
+  /// Of beams that hang on the body as in `odometer`. Each is gated by itself and written down; where nothing is known,
+  /// the plane through the hits is the start. Did it show anything?
+  bool add(const BeamRanges& ranges, const OdometerState& odometer, Records& records);
 
   [[nodiscard]] bool known() const { return known_; }
   [[nodiscard]] const Eigen::Vector3d& n_B() const { return n_B_; }
   /// Of its tilt about the columns of tangent_basis(n_B()) [rad^2].
   [[nodiscard]] const Eigen::Matrix2d& covariance() const { return P_; }
-  /// Standard deviation of what the last reading alone tells [rad]. Errors of the normal last over several readings; a
-  /// way along it errs as if each reading had an error of its own, of this size.
+  /// Standard deviation of what the last reading alone shows [rad]. Errors of the normal last over several readings; a
+  /// path along it errs as if each reading had an error of its own, of this size.
   [[nodiscard]] double reading_sigma() const { return reading_sigma_; }
-  [[nodiscard]] int beams_used() const { return used_; }          ///< of the last reading
-  [[nodiscard]] int beams_rejected() const { return rejected_; }  ///< the same
 
  private:
   OdometerConfig config_;
@@ -44,7 +43,6 @@ class GroundNormal {
   Eigen::Vector3d n_B_ = Eigen::Vector3d::UnitZ();
   Eigen::Matrix2d P_ = Eigen::Matrix2d::Identity();
   double reading_sigma_ = 0.0;
-  int used_ = 0, rejected_ = 0;
 };
 
 }  // namespace ear::smoother

@@ -1,4 +1,3 @@
-// Smoother: samples and frames in, one frame after the other, start and restart.
 #include "smoother/smoother.h"
 
 #include <algorithm>
@@ -7,243 +6,296 @@
 #include <utility>
 
 #include "filter/ekf/initial_state.h"
+#include "filter/ekf/propagation.h"
+#include "filter/health/advise.h"
+#include "filter/report.h"
 
 namespace ear::smoother {
 namespace {
 
-constexpr std::size_t kImuCapacity = 4096;
-constexpr std::size_t kWheelCapacity = 512;
-constexpr std::size_t kMaxCompared = 512;  // features of a frame whose motion is compared with other sensors
-constexpr double kHeldSample = 0.04;       // [s] so far the newest IMU sample may stand in for one that is missing
-constexpr double kSpinUp = 0.1;            // [s] after a touchdown until the wheels roll
-constexpr double kTakeoffUnseen = 0.1;     // [s] before a take-off is noticed the wheels are wrong
-constexpr double kUnseenSpeed = 1.0;       // [m/s] that the vehicle may have gained since it was lost
+constexpr double kTakeoffUnseen = 0.1;  // [s] before a take-off is noticed the wheels are wrong
+constexpr double kJump = 1.0;  // [m] since the last good frame, beyond twice what the velocity explains: impossible
 
-const Calibration& supported(const FilterConfig& config, const Calibration& calibration) {
+/// Wheels need the ground's normal: without lasers they are not used.
+FilterConfig supported(FilterConfig config, const Calibration& calibration) {
   if (checked(calibration).cameras.empty()) throw std::invalid_argument("smoother: calibration: cameras are needed");
-  const OdometerModel model = config.odometer.model;
+  OdometerModel& model = config.odometer.model;
   if (calibration.encoder && model != OdometerModel::none && model != OdometerModel::terrain) {
     throw std::invalid_argument("smoother: filter.odometer.model: terrain or none");
   }
-  return calibration;
+  if (!calibration.lasers || calibration.lasers->beams.empty()) model = OdometerModel::none;
+  return config;
+}
+
+/// Does the velocity explain how far the vehicle went from one estimate to the next?
+bool explained(const NavState& before, const NavState& now) {
+  const double speed = std::max(before.v_W.norm(), now.v_W.norm());
+  return (now.p_WB - before.p_WB).norm() < 2.0 * speed * seconds_between(before.t_ns, now.t_ns) + kJump;
+}
+
+/// After a change of the ground under the wheels nothing is known of it. A take-off is noticed a moment late.
+void note(ContactEvent event, IntervalMeter& meter, Window* window) {
+  if (event == ContactEvent::none) return;
+  meter.forget_ground();
+  if (event == ContactEvent::takeoff && window) window->forget_wheels(kTakeoffUnseen);
 }
 
 }  // namespace
 
 Smoother::Smoother(const FilterConfig& config, const Calibration& calibration)
-    : config_(checked(config)),
-      calibration_(supported(config, calibration)),
-      focal_px_(focal_length(calibration)),
-      gate_(config.gate_probability, 3),
-      guard_(calibration, config.max_imu_gap),
-      impact_guard_(config.impact, calibration.imu),
-      imu_(kImuCapacity),
-      turns_(kWheelCapacity),
-      ranges_(kWheelCapacity),
-      contact_(config.contact, calibration),
-      standstill_(config.standstill, focal_px_),
-      consistency_check_(config.anomaly),
-      camera_displacement_(config.feature_sigma_px / focal_px_, kMaxCompared),
-      normal_(config.odometer, calibration, config.gate_probability),
-      starter_(std::make_unique<Filter>(config, calibration)),
-      P_(err::clones) {
-  const bool wheels = calibration.encoder && calibration.lasers && !calibration.lasers->beams.empty();
-  if (wheels && config.odometer.model == OdometerModel::terrain) encoder_.emplace(*calibration.encoder);
-}
+    : config_(supported(checked(config), calibration)),
+      calibration_(calibration),
+      ingest_(config_, calibration),
+      ekf_(config_, calibration),
+      sources_(config_, calibration),
+      start_(config_, calibration),
+      consistency_check_(config_.anomaly),
+      health_(calibration, sources_.uses_wheels(), sources_.uses_wheels()),
+      meter_(config_, calibration) {}
 
-TimeNs Smoother::imu_time(TimeNs camera_time_ns) const {
-  return camera_time_ns + static_cast<TimeNs>(std::llround(1e9 * calibration().camera.time_offset));
-}
-
-TimeNs Smoother::camera_time(TimeNs imu_time_ns) const {
-  return imu_time_ns - static_cast<TimeNs>(std::llround(1e9 * calibration().camera.time_offset));
-}
-
-CalibrationState Smoother::calibration() const {
-  return window_ ? CalibrationState{window_->cameras(), window_->odometer()} : starter_->calibration();
-}
-
-std::optional<TimeNs> Smoother::state_time() const {
-  return window_ ? std::optional(window_->newest().t_ns) : std::nullopt;
-}
-
-FrameStamp Smoother::check_stamp(TimeNs t_ns) const {
-  if (any_frame_ && t_ns <= last_frame_ns_) return FrameStamp::not_later;
-  const bool covered =
-      is_time(t_ns) && !imu_.empty() && seconds_between(imu_.newest().t_ns, imu_time(t_ns)) < kHeldSample;
-  return covered ? FrameStamp::usable : FrameStamp::no_samples;
-}
-
-Status Smoother::status() const {
-  if (window_) return Status::tracking;
-  return last_good_ ? Status::lost : starter_->status();
-}
-
-void Smoother::add_imu(const ImuSample& sample) {
-  if (!window_) starter_->add_imu(sample);
-  const ImuVerdict verdict = guard_.judge(sample);
-  if (!verdict.accepted) return;
-  if (verdict.begins_anew) {
-    if (last_good_) last_good_->state.t_ns += verdict.clock_shift;
-    lose(sample.t_ns);
-    starter_->add_imu(sample);
-    imu_.clear();
-  }
-  const ImuNoiseFactors noise = impact_guard_.add(sample);
-  imu_.raise_newest_noise(static_cast<std::size_t>(impact_guard_.clipped_before()), noise);
-  imu_.push(sample, noise);
-  if (encoder_) note_contact(contact_.add_imu(sample));
-}
-
-void Smoother::add_encoder(const EncoderSample& sample) {
-  if (!window_) starter_->add_encoder(sample);
-  if (!encoder_ || guard_.judge(sample, state_time(), *encoder_) != Verdict::accepted) return;
-  note_contact(contact_.add_encoder(sample));
-  const std::optional<WheelIncrement> turn = encoder_->add(sample);
-  if (!turn) return;
-  wheel_rest_.add(*turn);
-  if (turns_.full()) turns_.pop();
-  turns_.push(*turn);
-}
-
-void Smoother::add_laser(const LaserSample& sample) {
-  if (!window_) starter_->add_laser(sample);
-  if (!encoder_ || guard_.judge(sample, state_time()) != Verdict::accepted) return;
-  note_contact(contact_.add_laser(sample));
-  if (ranges_.full()) ranges_.pop();
-  ranges_.push(BeamRanges(sample));
-}
-
-/// After a change of the ground under the wheels nothing is known of it. A take-off is noticed a moment late.
-void Smoother::note_contact(ContactEvent event) {
-  if (event == ContactEvent::none) return;
-  normal_.forget();
-  if (event == ContactEvent::takeoff && window_) window_->forget_wheels(kTakeoffUnseen);
-}
-
-bool Smoother::rolls_at(TimeNs t_ns) const {
-  const std::optional<TimeNs> since_ns = contact_.since_ns();
-  return on_ground() && (!since_ns || seconds_between(*since_ns, t_ns) > kSpinUp);
-}
+// ---- What happens to a frame
 
 std::optional<Estimate> Smoother::process(const FeatureFrame& given) {
-  if (check_stamp(given.t_ns) != FrameStamp::usable) return std::nullopt;
-  any_frame_ = true;
-  last_frame_ns_ = given.t_ns;
-  const FeatureFrame& frame = guard_.plausible(given);
-  std::optional<Estimate> estimate = window_ ? step(frame) : start(frame);
-  if (estimate && window_) {
-    last_image_ns_ = frame.t_ns;
-    const ImuState x = window_->newest();
-    image_T_WB_ = Pose{x.R_WB, x.p_WB};
-  }
-  return estimate;
+  const FrameStamp stamp = check_stamp(given.t_ns);
+  if (stamp == FrameStamp::no_samples) refuse_frame();
+  if (stamp != FrameStamp::usable) return std::nullopt;
+  const FrameAgreement seen = move_to(ingest_.plausible(given), true);
+  return report(true, seen);
 }
 
 std::optional<Estimate> Smoother::process_without_image(TimeNs t_ns) {
-  if (check_stamp(t_ns) != FrameStamp::usable || (window_ && !on_ground())) return std::nullopt;
-  any_frame_ = true;
-  last_frame_ns_ = t_ns;
-  if (window_) return step(FeatureFrame{t_ns, {}});
-  starter_->process_without_image(t_ns);  // which may start, but says where only at a frame
-  return std::nullopt;
+  if (check_stamp(t_ns) != FrameStamp::usable || (window_ && !sources_.on_ground())) return std::nullopt;
+  move_to(FeatureFrame{t_ns, {}}, false);
+  return report(false, FrameAgreement{});
 }
 
-/// The filter starts: from there on the window has its state and covariance.
-std::optional<Estimate> Smoother::start(const FeatureFrame& frame) {
-  std::optional<Estimate> started = starter_->process(frame);
-  if (!started) return std::nullopt;
-  const State& x = starter_->ekf().state();
-  const auto P = starter_->ekf().covariance().matrix();
-  window_.emplace(config_, focal_px_, x, P.topLeftCorner<err::clones, err::clones>());
-  covariance_ = NewestCovariance{started->covariance, P.block<6, 6>(err::wheel_radius, err::wheel_radius)};
-  b_g_ = x.imu.b_g;
-  forget_passed(x.imu.t_ns);
-  while (!ranges_.empty() && ranges_.front().t_ns <= x.imu.t_ns) ranges_.pop();
-  normal_.forget();
-  camera_displacement_.clear();
-  was_still_ = started->frame.standing;
-  statistics_ = started->frame;
-  consistency_ = started->consistency;
-  if (last_good_) go_on_from(*last_good_);
-  starter_.reset();
-  return reported();
-}
-
-/// The window's world begins where the estimates ended, and as uncertain as the time between makes it.
-void Smoother::go_on_from(const Estimate& last) {
-  const NavState here = predict_here(window_->newest().t_ns);
-  const double way = seconds_between(last.state.t_ns, here.t_ns) * (last.state.v_W.norm() + kUnseenSpeed);
-  const double variance = last.covariance.diagonal().segment<3>(estimate_error::position).maxCoeff();
-  alignment_ = MapAlignment::join(last.state, here, M_PI, std::sqrt(std::max(variance, 0.0) + way * way));
-  ++health_.reset_counter;
-}
-
-void Smoother::begin_anew() {
-  window_.reset();
-  covariance_.reset();
-  starter_ = std::make_unique<Filter>(config_, calibration_);
-  turns_.clear();
-  ranges_.clear();
-  passed_turn_.reset();
-  normal_.forget();
-  image_T_WB_.reset();
-  agrees_since_ns_.fill(0);
-}
-
-/// The window came to nothing: it is given up, and the filter's start begins anew.
-void Smoother::lose(TimeNs t_ns) {
-  begin_anew();
-  guard_.restart();
-  if (!last_good_) return;
-  health_.status = HealthStatus::lost;
-  health_.since_ns = t_ns;
-  health_.aiding = Aiding::none;
-  health_.quality = 0;
+FrameAgreement Smoother::move_to(const FeatureFrame& frame, bool image) {
+  const TimeNs t_ns = imu_time(frame.t_ns, ekf_.state().camera);
+  last_frame_ns_ = frame.t_ns;
+  consistency_ = Consistency{};
+  records_ = records_for(frame, records_, sources_.on_ground());
+  sources_.look_at(frame, t_ns, ingest_, ekf_);
+  if (window_) return step(frame, t_ns, image);
+  start(frame, t_ns);
+  const FrameAgreement nothing;
+  if (image && health_.check_image(nothing, t_ns, ingest_.imu().newest().t_ns)) {
+    sources_.cameras().remember(frame, ekf_);
+  }
+  return nothing;
 }
 
 /// (1), one frame on.
-std::optional<Estimate> Smoother::step(const FeatureFrame& frame) {
-  const TimeNs t_ns = imu_time(frame.t_ns);
-  const ImuState x = window_->newest();
-  if (t_ns <= x.t_ns) return std::nullopt;
-  begin_statistics(frame);
-  b_g_ = x.b_g;
-  contact_.set_gyro_bias(b_g_);
-  compare_sensors(frame, x, t_ns);
-  window_->add(moved_to(frame, x, t_ns), frame.features);
-  covariance_ = window_->optimize() ? window_->covariance() : std::nullopt;
-  forget_passed(t_ns);
-  if (!covariance_) {
-    lose(t_ns);
-    return std::nullopt;
+FrameAgreement Smoother::step(const FeatureFrame& frame, TimeNs t_ns, bool image) {
+  const State x = ekf_.state();
+  if (t_ns <= x.imu.t_ns) {  // readings that come late, and no room for more
+    ingest_.drop_before(t_ns + 1);
+    return {};
   }
-  statistics_.features_used = window_->features_used();
-  statistics_.features_rejected = window_->features_rejected();
-  statistics_.clones = static_cast<int>(window_->size());
+  const bool rolls = sources_.on_ground() && sources_.ground().rolls_at(x.imu.t_ns);
+  const bool stands = sources_.standstill().stands();
+  const Displacements displacements = sources_.displacements(frame, t_ns, ingest_, ekf_, meter_.normal().known());
+  consistency_ = consistency_check_(displacements);
+  const Advice advice = advise(consistency_, health_.health(), config_.anomaly);
+  NewFrame next = meter_.measure({x, t_ns, displacements, advice, rolls, stands}, ingest_, records_);
+
+  sources_.propagate(t_ns, advice, ingest_, ekf_);  // for the images to be compared with
+  FrameAgreement seen;
+  if (image && !frame.repeated) seen = sources_.check(frame, ingest_, ekf_);
+  seen.frozen = frame.repeated;
+  seen.right_skipped = frame.right_skipped;
+  const bool use_image = image && health_.check_image(seen, t_ns, ingest_.imu().newest().t_ns);
+  next.feature_noise = seen.noise / advice.of(MotionSensor::camera);
+
+  window_->add(next, use_image ? frame.features : std::vector<FeatureObservation>{});
+  std::optional<Eigen::MatrixXd> P;
+  if (window_->optimize()) P = window_->covariance();
+  if (!P) {
+    stop();
+    return seen;
+  }
+  assume_newest(std::move(*P));
+  if (use_image) sources_.cameras().remember(frame, ekf_);
+  records_.statistics.standing = stands;
+  records_.statistics.features_used = window_->features_used();
+  records_.statistics.features_rejected = window_->features_rejected();
+  records_.statistics.clones = static_cast<int>(window_->size());
   window_->make_room();
-  return reported();
+  return seen;
 }
 
-void Smoother::begin_statistics(const FeatureFrame& frame) {
-  statistics_ = FrameStatistics{};
-  statistics_.tracks = static_cast<int>(frame.features.size());
-  statistics_.stereo = static_cast<int>(std::count_if(frame.features.begin(), frame.features.end(),
-                                                      [](const FeatureObservation& f) { return f.has_right; }));
-  statistics_.on_ground = on_ground();
-}
-
-/// The newest state, unless it cannot be believed.
-std::optional<Estimate> Smoother::reported() {
-  Estimate estimate = make_estimate();
-  judge(estimate);
-  if (health_.status == HealthStatus::lost) {
-    lose(estimate.state.t_ns);
-    return std::nullopt;
+/// `P`: by the window, which does not know of the ground's normal. Its error is counted from that of the attitude, in
+/// the world it turns along.
+void Smoother::assume_newest(Eigen::MatrixXd P) {
+  State x = window_->newest();
+  const GroundNormal& normal = meter_.normal();
+  const Eigen::Vector3d n_B = normal.known() ? normal.n_B() : Eigen::Vector3d(x.odometer.T_BO.R.col(2));
+  x.ground.n_W = x.imu.R_WB * n_B;
+  if (normal.known()) {
+    const Eigen::Matrix2d turned = tangent_basis(x.ground.n_W).transpose() * x.imu.R_WB * tangent_basis(n_B);
+    P.block<2, 2>(err::normal, err::normal) = turned * normal.covariance() * turned.transpose();
   }
-  estimate.health = health_;
-  last_good_ = estimate;
+  ekf_.assume(x, P);
+}
+
+/// What is given away of the state, and whether it is.
+std::optional<Estimate> Smoother::report(bool image, const FrameAgreement& agreement) {
+  std::optional<Estimate> estimate;
+  if (window_) {
+    const bool ground_known = sources_.on_ground() && meter_.normal().known();
+    estimate = make_estimate(ekf_, ground_known, alignment_, 0.0, records_, consistency_);
+  }
+  const TimeNs t_ns = imu_time(*last_frame_ns_, ekf_.state().camera);
+  HealthMonitor::Frame frame = health_frame(t_ns, ekf_, sources_, agreement, records_, estimate);
+  frame.image = image;
+  if (estimate && last_good_ && health_.usable()) {
+    frame.possible = frame.possible && explained(last_good_->state, estimate->state);
+  }
+  health_.add_frame(frame, records_.log.records());
+  if (window_ && (!frame.possible || health_.contradicted())) stop();
+  if (!window_ || !health_.usable()) return std::nullopt;
+  estimate->health = health_.health();
+  if (estimate->health.aiding != Aiding::none) last_good_ = estimate;
   return estimate;
+}
+
+// ---- Starts
+
+/// As the filter does. From there on the window has its state and covariance.
+void Smoother::start(const FeatureFrame& frame, TimeNs t_ns) {
+  const bool stands = sources_.standstill().stands();
+  const Start::Situation now{frame, t_ns, stands, sources_.on_ground(), last_good_.has_value(), ekf_.state().camera};
+  const std::optional<StartState> found = start_.find(now, sources_.standstill().recent(ingest_.imu(), t_ns), ingest_);
+  if (!found) return;
+  alignment_ = start_.begin(*found, last_good_, Advice{}, ingest_, ekf_, sources_, records_);
+  sources_.advance(t_ns, Advice{}, ingest_, ekf_, records_);
+  sources_.reset();
+  const Eigen::MatrixXd P = ekf_.covariance().matrix().topLeftCorner<err::clones, err::clones>();
+  window_ = std::make_unique<Window>(config_, focal_length(calibration_), ekf_.state(), P);
+  meter_.begin(stands);
+  records_.statistics.standing = stands;
+  assume_newest(P);
+}
+
+/// The window came to nothing: it is given up.
+void Smoother::stop() {
+  window_.reset();
+  ekf_.reset();
+  sources_.reset();
+  ingest_.drop_readings();
+  ingest_.interruption() = ImuInterruption{};
+}
+
+/// As after construction, but for the clocks, and where the vehicle was last known to be.
+void Smoother::restart(TimeNs t_ns, TimeNs clock_shift) {
+  Smoother fresh(config_, calibration_);
+  ingest_.restart();
+  fresh.ingest_ = std::move(ingest_);
+  fresh.health_.succeed(health_, t_ns);
+  fresh.alignment_ = alignment_;
+  fresh.last_good_ = std::move(last_good_);
+  if (fresh.last_good_) fresh.last_good_->state.t_ns += clock_shift;
+  *this = std::move(fresh);
+}
+
+// ---- Samples in
+
+void Smoother::add_imu(const ImuSample& sample) {
+  ingest_.imu_clock().add(sample);
+  take_imu();
+}
+
+void Smoother::take_imu() {
+  while (const std::optional<ImuSample> sample = ingest_.imu_clock().next()) {
+    const ImuVerdict verdict = ingest_.judge(*sample);
+    if (!verdict.accepted) {
+      health_.add_refused_imu();
+      continue;
+    }
+    if (verdict.begins_anew) restart(sample->t_ns, verdict.clock_shift);
+    health_.add_imu(*sample, config_.max_imu_gap);
+    // Without frames for long, the window moves on before the samples are overwritten.
+    const std::optional<TimeNs> due_ns = ingest_.imu_due();
+    if (due_ns && window_) move_to(FeatureFrame{camera_time(*due_ns), {}}, false);
+    const ImuFault fault = ingest_.store(*sample);
+    health_.report_imu_fault(fault.gyro, fault.accel, sample->t_ns);
+    note(sources_.watch_contact(*sample, ekf_), meter_, window_.get());
+  }
+  if (ingest_.imu_clock().take_correction()) health_.report_imu_fault(true, true, ingest_.imu().newest().t_ns);
+}
+
+void Smoother::add_encoder(const EncoderSample& sample) {
+  if (!sources_.uses_wheels()) return;
+  ingest_.imu_clock().observe(ImuClock::Stream::encoder, sample.t_ns);
+  take_imu();
+  const Ingest::Encoders taken = ingest_.take(sample, ekf_.time());
+  if (!ingest_.imu().empty()) health_.add_encoder(taken.sample, taken.verdict, ingest_.imu().newest().t_ns);
+  if (taken.verdict != Verdict::accepted) return;
+  note(sources_.watch_contact(taken.sample, ekf_), meter_, window_.get());
+  if (!taken.increment) return;
+  sources_.standstill().add(*taken.increment);
+  if (const auto due_ns = ingest_.due_before(*taken.increment, ekf_.running())) {
+    move_to(FeatureFrame{camera_time(*due_ns), {}}, false);
+  }
+  ingest_.push(*taken.increment);
+}
+
+void Smoother::add_laser(const LaserSample& sample) {
+  if (!sources_.uses_wheels()) return;
+  ingest_.imu_clock().observe(ImuClock::Stream::laser, sample.t_ns);
+  take_imu();
+  const Verdict verdict = ingest_.judge(sample, ekf_.time());
+  if (verdict == Verdict::accepted) note(sources_.watch_contact(sample, ekf_), meter_, window_.get());
+  if (!ingest_.imu().empty()) {
+    health_.add_laser(sample, verdict, *calibration_.lasers, sources_.ground().stuck_beams(),
+                      ingest_.imu().newest().t_ns);
+  }
+  if (verdict != Verdict::accepted) return;
+  if (const auto due_ns = ingest_.due_before(sample, ekf_.running())) {
+    move_to(FeatureFrame{camera_time(*due_ns), {}}, false);
+  }
+  ingest_.push(sample);
+}
+
+std::optional<TimeNs> Smoother::common_stamp(TimeNs camera_stamp_ns) {
+  ingest_.imu_clock().observe(ImuClock::Stream::camera, camera_stamp_ns);
+  take_imu();
+  if (!is_time(camera_stamp_ns)) return camera_stamp_ns;
+  const std::optional<TimeNs> stamp = ingest_.camera_stamp(camera_stamp_ns);
+  if (!stamp) health_.report_camera_fault(ingest_.imu().newest().t_ns);
+  return stamp;
+}
+
+void Smoother::refuse_frame() {
+  if (!ingest_.imu().empty()) health_.add_refused_frame(ingest_.imu().newest().t_ns);
+}
+
+// ---- Questions
+
+/// A frame before the newest of the window comes too late, as after its time offset was learned.
+FrameStamp Smoother::check_stamp(TimeNs t_ns) const {
+  if (last_frame_ns_ && t_ns <= *last_frame_ns_) return FrameStamp::not_later;
+  if (!is_time(t_ns)) return FrameStamp::no_samples;
+  const TimeNs imu_ns = imu_time(t_ns, ekf_.state().camera);
+  if (ekf_.running() && imu_ns <= ekf_.state().imu.t_ns) return FrameStamp::not_later;
+  return ingest_.covers(imu_ns) ? FrameStamp::usable : FrameStamp::no_samples;
+}
+
+TimeNs Smoother::camera_time(TimeNs imu_time_ns) const { return ear::camera_time(imu_time_ns, ekf_.state().camera); }
+
+Status Smoother::status() const {
+  if (window_) return health_.lost() ? Status::lost : Status::tracking;
+  if (last_good_) return Status::lost;
+  return ingest_.imu().size() < 2 ? Status::waiting_for_imu : Status::waiting_for_standstill;
+}
+
+std::optional<RelativeMotion> Smoother::motion_to(TimeNs t_ns) const {
+  return motion_since_image(t_ns, ekf_, sources_, start_, ingest_);
+}
+
+std::optional<NavState> Smoother::predict(TimeNs t_ns) const {
+  if (!window_ || !health_.usable() || !is_time(t_ns)) return std::nullopt;
+  if (seconds_between(ingest_.imu().newest().t_ns, t_ns) > kLongestPredict) return std::nullopt;
+  return alignment_.to_world(nav_state(integrate_to(t_ns, ekf_.state().imu, ingest_.imu())));
 }
 
 }  // namespace ear::smoother

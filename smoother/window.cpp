@@ -1,4 +1,3 @@
-// Window: how it begins, how a frame is appended, and what it holds.
 #include "smoother/window.h"
 
 #include <Eigen/Cholesky>
@@ -6,7 +5,9 @@
 #include <utility>
 
 #include "filter/sources/cameras/parallax.h"
-#include "smoother/wheel_factor.h"
+#include "smoother/minimum.h"
+#include "smoother/normal_equations.h"
+#include "smoother/wheel_chain.h"
 
 namespace ear::smoother {
 namespace {
@@ -15,123 +16,181 @@ namespace {
 constexpr double kLeastPosition = 1e-4;
 constexpr double kLeastRotation = 1e-5;
 constexpr double kLeastCalibration = 1e-7;
+constexpr int kCalibrationSteps = 19;
 
-/// Of the filter's covariance what the window has unknowns for, in the order of Window::blocks().
+constexpr double kLongestInterval = 0.5;  // [s] between frames kept, but for a vehicle that stands
+constexpr double kLongestRest = 10.0;     // [s] for one that does
+
+/// Of the filter's covariance what the window has unknowns for.
 Eigen::MatrixXd start_covariance(const Eigen::MatrixXd& P) {
-  std::vector<int> entries;
-  const auto take = [&](int begin, int count) {
-    for (int i = 0; i < count; ++i) entries.push_back(begin + i);
-  };
-  take(err::theta, 3);
-  take(err::rho, 3);
-  take(err::nu, 3);
-  take(err::b_g, 6);
-  take(err::camera, 6);
-  take(err::stereo, 6);
-  take(err::time_offset, 1);
-  take(err::wheel_radius, 2);
-  take(err::track_width, 1);
-  take(err::odometer, 3);
+  const std::vector<int> entries = filter_entries();
   Eigen::MatrixXd P_start = P(entries, entries);
   P_start.diagonal().head<3>().array() += kLeastRotation * kLeastRotation;
   P_start.diagonal().segment<3>(3).array() += kLeastPosition * kLeastPosition;
-  P_start.diagonal().tail(19).array() += kLeastCalibration * kLeastCalibration;
+  P_start.diagonal().tail<kCalibrationSteps>().array() += kLeastCalibration * kLeastCalibration;
   return P_start;
+}
+
+Interval joined(const Interval& first, const Interval& second) {
+  Interval both = first;
+  both.imu.append(second.imu);
+  both.still = first.still && second.still;
+  both.wheels.reset();
+  if (first.wheels && second.wheels) both.wheels = chained(*first.wheels, *second.wheels);
+  return both;
+}
+
+std::vector<const double*> touched_by(const std::vector<const Factor*>& factors,
+                                      const std::vector<PointFactors>& points) {
+  std::vector<const double*> touched;
+  const auto add = [&](const Factor* factor) {
+    touched.insert(touched.end(), factor->blocks.begin(), factor->blocks.end());
+  };
+  for (const Factor* factor : factors) add(factor);
+  for (const PointFactors& point : points) std::for_each(point.factors.begin(), point.factors.end(), add);
+  return touched;
+}
+
+/// What the factors and points show of all that they touch, the frame eliminated. Nothing if it is not finite.
+std::unique_ptr<PriorFactor> without(const Unknowns::Frame& frame, const std::vector<PriorBlock>& blocks,
+                                     const std::vector<const Factor*>& factors,
+                                     const std::vector<PointFactors>& points) {
+  const std::vector<const double*> touched = touched_by(factors, points);
+  std::vector<PriorBlock> removed, kept;
+  for (const PriorBlock& block : blocks) {
+    if (block.block == frame.pose.data() || block.block == frame.motion.data()) {
+      removed.push_back(block);
+    } else if (std::find(touched.begin(), touched.end(), block.block) != touched.end()) {
+      kept.push_back(block);
+    }
+  }
+  return marginalize(factors, points, removed, kept);
 }
 
 }  // namespace
 
 Window::Window(const FilterConfig& config, double focal_px, const State& x, const Eigen::Ref<const Eigen::MatrixXd>& P)
-    : config_(config),
-      focal_px_(focal_px),
-      sigma_(config.feature_sigma_px / focal_px),
-      gate_(config.gate_probability, 4 * (config.window + 1)),
-      huber_(config.huber_px / config.feature_sigma_px),
-      given_(x.odometer) {
-  camera_ = smoother::to_block(x.camera.T_BC0);
-  stereo_ = smoother::to_block(x.camera.T_C0C1);
-  offset_ = {x.camera.time_offset};
-  auto first = std::make_unique<Frame>();
-  first->number = next_number_++;
-  first->t_ns = x.imu.t_ns;
-  first->pose = smoother::to_block(Pose{x.imu.R_WB, x.imu.p_WB});
-  Eigen::Map<Eigen::Matrix<double, kMotionStep, 1>>(first->motion.data(), kMotionStep) << x.imu.v_W, x.imu.b_g,
-      x.imu.b_a;
-  frames_.push_back(std::move(first));
+    : config_(config), focal_px_(focal_px), unknowns_(x), terms_(config, focal_px) {
   const Eigen::MatrixXd P_start = start_covariance(P);
   const Eigen::MatrixXd whitening =
       P_start.llt().matrixL().solve(Eigen::MatrixXd::Identity(P_start.rows(), P_start.cols()));
-  set_prior(std::make_unique<PriorFactor>(blocks(), whitening, Eigen::VectorXd::Zero(P_start.rows())));
+  set_prior(std::make_unique<PriorFactor>(unknowns_.blocks(), whitening, Eigen::VectorXd::Zero(P_start.rows())));
 }
 
-void Window::add(const NewFrame& given, const std::vector<FeatureObservation>& features) {
-  const ImuState x = newest();
-  const double T = given.since.imu.duration();
-  auto frame = std::make_unique<Frame>();
-  frame->number = next_number_++;
-  frame->t_ns = given.t_ns;
-  const Eigen::Matrix3d R_WB = x.R_WB * given.since.imu.R_BiBj();
-  const Eigen::Vector3d v_W = x.v_W + kGravity_W * T + x.R_WB * given.since.imu.dv_Bi();
-  const Eigen::Vector3d p_WB = x.p_WB + x.v_W * T + 0.5 * kGravity_W * T * T + x.R_WB * given.since.imu.dp_Bi();
-  frame->pose = smoother::to_block(Pose{R_WB, p_WB});
-  Eigen::Map<Eigen::Matrix<double, kMotionStep, 1>>(frame->motion.data(), kMotionStep) << v_W, x.b_g, x.b_a;
-  frame->since = given.since;
-  frame->rate_B = given.rate_B;
-  frame->v_B = R_WB.transpose() * v_W;
-  frame->time_offset = offset_[0];
-  frame->feature_noise = given.feature_noise;
-  frame->image = !features.empty();
-  tracks_.add(frame->number, features);
-  frames_.push_back(std::move(frame));
+void Window::add(const NewFrame& frame, const std::vector<FeatureObservation>& features) {
+  tracks_.add(unknowns_.append(frame, !features.empty()), features);
+}
+
+bool Window::optimize() {
+  features_rejected_ = terms_.collect(unknowns_, tracks_);
+  if (!minimise(prior_, terms_, unknowns_)) return false;
+  features_rejected_ += terms_.drop_outliers(tracks_);
+  return true;
+}
+
+std::optional<Eigen::MatrixXd> Window::covariance() const { return newest_covariance(prior_, terms_, unknowns_); }
+
+void Window::make_room() {
+  if (size() > static_cast<std::size_t>(config_.window)) {
+    const std::size_t index = frame_to_drop();
+    if (index == 0) {
+      marginalize_oldest();
+    } else {
+      drop_frame(index);
+    }
+  }
+  tracks_.keep_if([](const Track& track) { return !track.observations.empty(); });
+  terms_.forget_points_without(tracks_);
 }
 
 void Window::forget_wheels(double duration) {
   double passed = 0.0;
-  for (std::size_t i = frames_.size(); i-- > 1 && passed < duration;) {
-    passed += frames_[i]->since.imu.duration();
-    frames_[i]->since.wheels.reset();
+  for (std::size_t i = size(); i-- > 1 && passed < duration;) {
+    passed += unknowns_[i].since.imu.duration();
+    unknowns_[i].since.wheels.reset();
   }
 }
 
-ImuState Window::newest() const {
-  const Frame& frame = *frames_.back();
-  const Pose T_WB = to_pose(frame.pose.data());
-  const Eigen::Map<const Eigen::Matrix<double, 9, 1>> m(frame.motion.data());
-  return {frame.t_ns, T_WB.R, m.head<3>(), T_WB.p, m.segment<3>(motion_entry::b_g), m.segment<3>(motion_entry::b_a)};
+State Window::newest() const {
+  State x;
+  x.imu = unknowns_.newest();
+  x.camera = unknowns_.cameras();
+  x.odometer = unknowns_.odometer();
+  return x;
 }
 
-CameraState Window::cameras() const { return {to_pose(camera_.data()), to_pose(stereo_.data()), offset_[0]}; }
-
-OdometerState Window::odometer() const { return with_errors(given_, wheels_.data()); }
-
-std::vector<PriorBlock> Window::blocks() const {
-  std::vector<PriorBlock> result;
-  const auto add = [&](BlockKind kind, const double* block, int size, double* body_pose = nullptr) {
-    result.push_back(
-        {kind, const_cast<double*>(block), size, body_pose, Eigen::Map<const Eigen::VectorXd>(block, size)});
-  };
-  for (const std::unique_ptr<Frame>& frame : frames_) {
-    add(BlockKind::body_pose, frame->pose.data(), 7);
-    add(BlockKind::motion, frame->motion.data(), 9, frame->pose.data());
-  }
-  add(BlockKind::sensor_pose, camera_.data(), 7);
-  add(BlockKind::sensor_pose, stereo_.data(), 7);
-  add(BlockKind::additive, offset_.data(), 1);
-  add(BlockKind::additive, wheels_.data(), 6);
-  return result;
+/// As the filter does: the frame before the newest goes if it shows little that the one before it does not, unless all
+/// of the window shows one place. Here, also if it has no image, or the vehicle stands; and frames are kept close
+/// enough for the inertial samples between them to be worth something. Otherwise 0, the oldest.
+std::size_t Window::frame_to_drop() {
+  const std::size_t n = size();
+  const Interval& before = unknowns_[n - 2].since;
+  const Interval& after = unknowns_[n - 1].since;
+  const double joined = before.imu.duration() + after.imu.duration();
+  if (before.still && after.still) return joined < kLongestRest ? n - 2 : 0;
+  if (joined > kLongestInterval) return 0;
+  if (!unknowns_[n - 2].image) return n - 2;
+  const bool copy = parallax_px(n - 3, n - 2) < config_.keyframe_parallax_px;
+  return copy && !(parallax_px(0, n - 1) < config_.keyframe_parallax_px) ? n - 2 : 0;
 }
 
-double Window::parallax_px(std::size_t from, std::size_t to) const {
-  const Eigen::Matrix3d R_BC0 = to_pose(camera_.data()).R;
-  const FrameRotation a{frames_[from]->number, pose(from).R * R_BC0};
-  const FrameRotation b{frames_[to]->number, pose(to).R * R_BC0};
+double Window::parallax_px(std::size_t from, std::size_t to) {
+  const Eigen::Matrix3d R_BC0 = unknowns_.cameras().T_BC0.R;
+  const FrameRotation a{unknowns_[from].number, unknowns_.pose(from).R * R_BC0};
+  const FrameRotation b{unknowns_[to].number, unknowns_.pose(to).R * R_BC0};
   return focal_px_ * median_parallax(tracks_, a, b, parallax_);
 }
 
-std::size_t Window::index_of(std::uint64_t number) const {
-  const auto frame = std::lower_bound(frames_.begin(), frames_.end(), number,
-                                      [](const std::unique_ptr<Frame>& f, std::uint64_t n) { return f->number < n; });
-  return static_cast<std::size_t>(frame - frames_.begin());
+/// What the oldest frame and all features that it saw show of the others becomes part of the prior. These features'
+/// later observations are used up with it: each observation counts once.
+void Window::marginalize_oldest() {
+  const Unknowns::Frame& oldest = unknowns_[0];
+  terms_.collect_leaving(unknowns_, tracks_, oldest.number);
+  const auto seen_from_oldest = [&](const Factor& factor) { return factor.blocks.front() == oldest.pose.data(); };
+  std::vector<const Factor*> factors = {&prior_};
+  for (const Factor& factor : terms_.between()) {
+    if (seen_from_oldest(factor)) factors.push_back(&factor);
+  }
+  std::vector<PointFactors> points;
+  for (const PointTerm& term : terms_.points()) {
+    if (!std::any_of(term.factors.begin(), term.factors.end(), seen_from_oldest)) continue;
+    PointFactors point;
+    point.point = term.block->data();
+    for (const Factor& factor : term.factors) point.factors.push_back(&factor);
+    points.push_back(std::move(point));
+  }
+  set_prior(without(oldest, unknowns_.blocks(), factors, points));
+  const std::uint64_t number = oldest.number;
+  tracks_.keep_if([&](const Track& track) { return track.observations.front().frame != number; });
+  unknowns_.erase(0);
+  terms_.clear();
+}
+
+/// What it saw is forgotten; what moved the vehicle to it and on is one interval now.
+void Window::drop_frame(std::size_t index) {
+  const Unknowns::Frame& frame = unknowns_[index];
+  Interval& after = unknowns_[index + 1].since;
+  after = joined(frame.since, after);
+  const std::vector<double*>& known = prior_.blocks;
+  if (std::find(known.begin(), known.end(), frame.pose.data()) != known.end()) {
+    set_prior(without(frame, unknowns_.blocks(), {&prior_}, {}));
+  }
+  tracks_.forget_frame(frame.number);
+  unknowns_.erase(index);
+  terms_.clear();
+}
+
+/// Nothing in place of a prior that is no number: the old one would name blocks that are gone. What follows from that
+/// is seen in the covariance.
+void Window::set_prior(std::unique_ptr<PriorFactor> prior) {
+  if (!prior) {
+    const std::vector<PriorBlock> nothing = {unknowns_.blocks().back()};
+    prior = std::make_unique<PriorFactor>(nothing, Eigen::MatrixXd::Identity(6, 6), Eigen::VectorXd::Zero(6));
+  }
+  Factor factor;
+  for (const PriorBlock& block : prior->blocks()) factor.blocks.push_back(block.block);
+  factor.cost = std::move(prior);
+  prior_ = std::move(factor);
 }
 
 }  // namespace ear::smoother

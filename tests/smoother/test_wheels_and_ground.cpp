@@ -33,13 +33,13 @@ OdometerState odometer_of_vehicle() {
 }
 
 /// Along the beam to the plane n . x = -0.075.
-std::array<double, kMaxBeams> ranges(const Calibration& calibration, const Eigen::Vector3d& n_B) {
-  std::array<double, kMaxBeams> range{};
-  for (std::size_t i = 0; i < range.size(); ++i) {
+BeamRanges ranges(const Calibration& calibration, const Eigen::Vector3d& n_B) {
+  BeamRanges ranges;
+  for (std::size_t i = 0; i < ranges.range.size(); ++i) {
     const LaserBeam& beam = calibration.lasers->beams[i];
-    range[i] = (-0.075 - n_B.dot(beam.p_BL)) / n_B.dot(beam.d_B);
+    ranges.range[i] = (-0.075 - n_B.dot(beam.p_BL)) / n_B.dot(beam.d_B);
   }
-  return range;
+  return ranges;
 }
 
 }  // namespace
@@ -85,9 +85,10 @@ TEST_CASE("wheel_chain: two displacements in a row are one over both") {
 TEST_CASE("ground_normal: nose up on flat ground, the normal leans back in the body; by hand 0.1 rad") {
   const Calibration calibration = vehicle();
   GroundNormal ground(OdometerConfig{}, calibration, 0.997);
+  Records records;
   CHECK_FALSE(ground.known());
   const Eigen::Vector3d n_B(std::sin(0.1), 0.0, std::cos(0.1));  // the body's z leans back by 0.1: n ahead of it
-  CHECK(ground.add(ranges(calibration, n_B), odometer_of_vehicle()));
+  CHECK(ground.add(ranges(calibration, n_B), odometer_of_vehicle(), records));
   CHECK((ground.n_B() - n_B).norm() < 1e-6);
   CHECK(ground.reading_sigma() < 0.1);
 
@@ -100,15 +101,20 @@ TEST_CASE("ground_normal: one beam that is broken does not turn the ground, one 
   const Calibration calibration = vehicle();
   GroundNormal ground(OdometerConfig{}, calibration, 0.997);
   const Eigen::Vector3d n_B = Eigen::Vector3d::UnitZ();
+  Records records;
   for (int i = 0; i < 10; ++i) {
     ground.move(Eigen::Matrix3d::Identity(), 0.02);
-    REQUIRE(ground.add(ranges(calibration, n_B), odometer_of_vehicle()));
+    REQUIRE(ground.add(ranges(calibration, n_B), odometer_of_vehicle(), records));
   }
-  std::array<double, kMaxBeams> broken = ranges(calibration, n_B);
-  broken[0] += 0.5;
-  broken[1] = std::numeric_limits<double>::quiet_NaN();
-  CHECK(ground.add(broken, odometer_of_vehicle()));
-  CHECK(ground.beams_used() == 1);
-  CHECK(ground.beams_rejected() == 1);
+  BeamRanges broken = ranges(calibration, n_B);
+  broken.range[0] += 0.5;
+  broken.range[1] = std::numeric_limits<double>::quiet_NaN();
+  records = Records{};
+  CHECK(ground.add(broken, odometer_of_vehicle(), records));
+  CHECK(records.statistics.beams_used == 1);
+  CHECK(records.statistics.beams_rejected == 1);
+  CHECK(records.log.records()[index_of(Source::beam_0)].rejected == 1);
+  CHECK(records.log.records()[index_of(Source::beam_1)].rejected == 0);
+  CHECK(records.log.records()[index_of(Source::beam_2)].used == 1);
   CHECK((ground.n_B() - n_B).norm() < 1e-3);
 }
