@@ -74,12 +74,26 @@ void Filter::propagate_to(const FeatureFrame& frame) {
   records_ = records_for(frame, records_, sources_.on_ground());
   sources_.look_at(frame, t_ns, ingest_, ekf_);
   if (ekf_.running()) {
-    consistency_ = consistency_check_(sources_.displacements(frame, t_ns, ingest_, ekf_));
+    consistency_ = consistency_check_(sources_.displacements(frame, t_ns, ingest_, ekf_, sources_.ground().known()));
     sources_.advance(t_ns, advise(consistency_, health_.health(), config_.anomaly), ingest_, ekf_, records_);
   }
-  consistency_ = consistency_check_(sources_.displacements(frame, t_ns, ingest_, ekf_, sources_.ground().known()));
-  sources_.advance(t_ns, advise(consistency_, health_.health(), config_.anomaly), ingest_, ekf_, records_);
-  start_again(frame);
+  if (!ekf_.running() || health_.lost()) {
+    start(frame);
+  } else {
+    start_.forget_frames();
+  }
+}
+
+/// A bias that jumped is as little known as at the start, and took the motion along until it was found out.
+void Filter::watch_biases(bool image) {
+  const TimeNs t_ns = ekf_.state().imu.t_ns;
+  const BiasJump jumped = bias_watch_.judge(ekf_.take_bias_changes(), t_ns, image);
+  if (!jumped.any()) return;
+  const double gyro = jumped.gyro ? config_.prior.gyro_bias : 0.0;
+  const double accel = jumped.accel ? config_.prior.accel_bias : 0.0;
+  ekf_.inflate_motion(gyro * kJumpNoticed, accel * kJumpNoticed, 0.5 * accel * kJumpNoticed * kJumpNoticed);
+  ekf_.inflate_biases(gyro, accel);
+  health_.report_imu_fault(jumped.gyro, jumped.accel, t_ns);
 }
 
 /// What is given away of the state, and whether it is.
