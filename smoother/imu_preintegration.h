@@ -1,4 +1,4 @@
-// What the inertial samples between two frames i and j say of the motion, whatever the state at i: Forster et al.,
+// What the inertial samples between two frames i and j show of the motion, whatever the state at i: Forster et al.,
 // "On-manifold preintegration" (2017), with the exact integrals of a rate and a force that are constant over each
 // piece.
 //

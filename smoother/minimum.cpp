@@ -28,7 +28,7 @@ std::shared_ptr<ceres::ParameterBlockOrdering> points_first(const Terms& terms, 
   return order;
 }
 
-bool solve(const Factor& prior, const Terms& terms, const Unknowns& unknowns) {
+bool solve(const Factor& prior, const Terms& terms, Unknowns& unknowns) {
   PoseManifold pose_manifold;
   ceres::Problem::Options owned_here;
   owned_here.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
@@ -73,7 +73,7 @@ std::vector<Eigen::VectorXd> values(const Terms& terms, const Unknowns& unknowns
   return result;
 }
 
-void set_values(const std::vector<Eigen::VectorXd>& values, const Terms& terms, const Unknowns& unknowns) {
+void set_values(const std::vector<Eigen::VectorXd>& values, const Terms& terms, Unknowns& unknowns) {
   std::size_t next = 0;
   for (const PriorBlock& block : unknowns.blocks()) {
     Eigen::Map<Eigen::VectorXd>(block.block, block.size) = values[next++];
@@ -85,7 +85,7 @@ void set_values(const std::vector<Eigen::VectorXd>& values, const Terms& terms, 
 
 }  // namespace
 
-bool minimise(const Factor& prior, const Terms& terms, const Unknowns& unknowns) {
+bool minimise(const Factor& prior, const Terms& terms, Unknowns& unknowns) {
   const std::vector<Eigen::VectorXd> before = values(terms, unknowns);
   bool solved = false;
   try {

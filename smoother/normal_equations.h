@@ -1,5 +1,5 @@
 // Factors summed up around the present values of their blocks, as the normal equations H step = -b of the steps. What
-// Ceres keeps to itself, for the covariance and for making a prior of what leaves the window.
+// Ceres keeps to itself, for the covariance and for making a prior of what goes out of the window.
 #pragma once
 
 #include <Eigen/Core>
@@ -47,8 +47,8 @@ class NormalEquations {
   Eigen::Matrix<double, Eigen::Dynamic, 3> W_;  // J^T J_point of the point at hand
 };
 
-/// What `factors` and `points` say of `kept`, `removed` eliminated; as a factor of the blocks in `kept`, in that order.
-/// The values in both lists are the present ones. Nothing if it is not finite.
+/// What `factors` and `points` show of `kept`, `removed` eliminated; as a factor of the blocks in `kept`, in that
+/// order. The values in both lists are the present ones. Nothing if it is not finite.
 struct PointFactors {
   std::vector<const Factor*> factors;
   const double* point = nullptr;

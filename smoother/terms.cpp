@@ -69,12 +69,12 @@ void Terms::collect_between(Unknowns& unknowns) {
   }
 }
 
-void Terms::collect_leaving(Unknowns& unknowns, const TrackTable& tracks, std::uint64_t leaving) {
+void Terms::collect_seen_from(Unknowns& unknowns, const TrackTable& tracks, std::uint64_t frame) {
   std::vector<std::uint64_t> collected;
   for (const PointTerm& term : point_terms_) collected.push_back(term.id);
   std::sort(collected.begin(), collected.end());
   for (const Track& track : tracks) {
-    if (track.observations.size() < kMinObservations || track.observations.front().frame != leaving) continue;
+    if (track.observations.size() < kMinObservations || track.observations.front().frame != frame) continue;
     if (std::binary_search(collected.begin(), collected.end(), track.id)) continue;
     if (!add_point(unknowns, track)) continue;
     if (!fits(point_terms_.back())) point_terms_.pop_back();

@@ -32,9 +32,9 @@ class Terms {
 
   /// All, anew. The number of features whose place cannot be found.
   int collect(Unknowns& unknowns, const TrackTable& tracks);
-  /// And those features that were too many to be unknowns, and lose their oldest frame, `leaving`, now: with what they
+  /// And those features that were too many to be unknowns, and lose their oldest frame, this one, now: with what they
   /// show where they lie by the present poses.
-  void collect_leaving(Unknowns& unknowns, const TrackTable& tracks, std::uint64_t leaving);
+  void collect_seen_from(Unknowns& unknowns, const TrackTable& tracks, std::uint64_t frame);
   /// Features that do not fit are used no more. Their number.
   int drop_outliers(TrackTable& tracks);
   /// Frames have gone: nothing is collected.

@@ -145,7 +145,7 @@ double Window::parallax_px(std::size_t from, std::size_t to) {
 /// later observations are used up with it: each observation counts once.
 void Window::marginalize_oldest() {
   const Unknowns::Frame& oldest = unknowns_[0];
-  terms_.collect_leaving(unknowns_, tracks_, oldest.number);
+  terms_.collect_seen_from(unknowns_, tracks_, oldest.number);
   const auto seen_from_oldest = [&](const Factor& factor) { return factor.blocks.front() == oldest.pose.data(); };
   std::vector<const Factor*> factors = {&prior_};
   for (const Factor& factor : terms_.between()) {
