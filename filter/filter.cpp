@@ -6,6 +6,7 @@
 #include "filter/ekf/initial_state.h"
 #include "filter/ekf/propagation.h"
 #include "filter/health/advise.h"
+#include "filter/intake.h"
 #include "filter/report.h"
 
 namespace ear {
@@ -166,64 +167,34 @@ void Filter::add_imu(const ImuSample& sample) {
 }
 
 void Filter::take_imu() {
-  while (const std::optional<ImuSample> sample = ingest_.imu_clock().next()) {
-    const ImuVerdict verdict = ingest_.judge(*sample);
-    if (!verdict.accepted) {
-      health_.add_refused_imu();
-      continue;
-    }
-    if (verdict.begins_anew) restart(sample->t_ns, verdict.clock_shift);
-    health_.add_imu(*sample, config_.max_imu_gap);
-    // Without frames for long, the state moves on before its samples are overwritten.
-    const std::optional<TimeNs> due_ns = ingest_.imu_due();
-    if (due_ns && ekf_.running()) sources_.propagate(*due_ns, Advice{}, ingest_, ekf_);
-    const ImuFault fault = ingest_.store(*sample);
-    health_.report_imu_fault(fault.gyro, fault.accel, sample->t_ns);
-    sources_.watch_contact(*sample, ekf_);
-  }
-  if (ingest_.imu_clock().take_correction()) health_.report_imu_fault(true, true, ingest_.imu().newest().t_ns);
+  ear::take_imu(
+      {ingest_, health_, sources_, ekf_}, config_.max_imu_gap,
+      [this](const ImuVerdict& verdict, TimeNs t_ns) { restart(t_ns, verdict.clock_shift); },
+      [this](TimeNs t_ns) { sources_.propagate(t_ns, Advice{}, ingest_, ekf_); }, [](ContactEvent) {});
 }
 
 void Filter::add_encoder(const EncoderSample& sample) {
   if (!sources_.uses_wheels()) return;
   ingest_.imu_clock().observe(ImuClock::Stream::encoder, sample.t_ns);
   take_imu();
-  const Ingest::Encoders taken = ingest_.take(sample, ekf_.time());
-  if (!ingest_.imu().empty()) health_.add_encoder(taken.sample, taken.verdict, ingest_.imu().newest().t_ns);
-  if (taken.verdict != Verdict::accepted) return;
-  sources_.watch_contact(taken.sample, ekf_);
-  if (!taken.increment) return;
-  sources_.standstill().add(*taken.increment);
-  if (const auto due_ns = ingest_.due_before(*taken.increment, ekf_.running())) {
-    sources_.advance(*due_ns, Advice{}, ingest_, ekf_, records_);
-  }
-  ingest_.push(*taken.increment);
+  take_encoder(
+      {ingest_, health_, sources_, ekf_}, sample,
+      [this](TimeNs t_ns) { sources_.advance(t_ns, Advice{}, ingest_, ekf_, records_); }, [](ContactEvent) {});
 }
 
 void Filter::add_laser(const LaserSample& sample) {
   if (!sources_.uses_wheels() || !calibration_.lasers || calibration_.lasers->beams.empty()) return;
   ingest_.imu_clock().observe(ImuClock::Stream::laser, sample.t_ns);
   take_imu();
-  const Verdict verdict = ingest_.judge(sample, ekf_.time());
-  if (verdict == Verdict::accepted) sources_.watch_contact(sample, ekf_);
-  if (!ingest_.imu().empty()) {
-    health_.add_laser(sample, verdict, *calibration_.lasers, sources_.ground().stuck_beams(),
-                      ingest_.imu().newest().t_ns);
-  }
-  if (verdict != Verdict::accepted) return;
-  if (const auto due_ns = ingest_.due_before(sample, ekf_.running())) {
-    sources_.advance(*due_ns, Advice{}, ingest_, ekf_, records_);
-  }
-  ingest_.push(sample);
+  take_laser(
+      {ingest_, health_, sources_, ekf_}, sample, *calibration_.lasers,
+      [this](TimeNs t_ns) { sources_.advance(t_ns, Advice{}, ingest_, ekf_, records_); }, [](ContactEvent) {});
 }
 
 std::optional<TimeNs> Filter::common_stamp(TimeNs camera_stamp_ns) {
   ingest_.imu_clock().observe(ImuClock::Stream::camera, camera_stamp_ns);
   take_imu();
-  if (!is_time(camera_stamp_ns)) return camera_stamp_ns;
-  const std::optional<TimeNs> stamp = ingest_.camera_stamp(camera_stamp_ns);
-  if (!stamp) health_.report_camera_fault(ingest_.imu().newest().t_ns);
-  return stamp;
+  return ear::common_stamp({ingest_, health_, sources_, ekf_}, camera_stamp_ns);
 }
 
 void Filter::refuse_frame() {
