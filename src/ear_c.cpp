@@ -58,9 +58,12 @@ void write_isometry(const Eigen::Isometry3d& T, double (&rows)[16]) {
   Eigen::Map<Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>{rows} = T.matrix();
 }
 
-/// The value of an enumeration, which in C can hold anything.
-template <typename E>
-E choice(int value, int count, const char* field) {
+/// The value of an enumeration, which in C can hold anything: it is read as the number that it is there.
+template <typename E, typename Given>
+E choice(const Given& given, int count, const char* field) {
+  static_assert(sizeof(Given) == sizeof(int));
+  int value = 0;
+  std::memcpy(&value, &given, sizeof(value));
   if (value < 0 || value >= count) throw std::invalid_argument(std::string(field) + ": no such choice");
   return static_cast<E>(value);
 }

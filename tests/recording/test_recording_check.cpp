@@ -134,9 +134,9 @@ TEST_CASE("standing: images that change, all or a little, and a covered lens") {
     std::normal_distribution<float> noise(0.0F, 2.0F);
     for (int i = 0; i < 30; ++i) {
       cv::Mat picture = image(i).clone();
-      picture.forEach<std::uint8_t>([&](std::uint8_t& pixel, const int*) {
+      for (std::uint8_t& pixel : cv::Mat_<std::uint8_t>(picture)) {
         pixel = cv::saturate_cast<std::uint8_t>(static_cast<float>(pixel) + noise(rng));
-      });
+      }
       watch.add(until(0.1 * i), {picture.data, picture.cols, picture.rows, static_cast<std::ptrdiff_t>(picture.step)});
     }
     return watch.stood(until(1.0), until(2.0));
