@@ -22,4 +22,7 @@ std::vector<T> workload(std::initializer_list<T> cases) {
 /// other test cases of its file.
 inline constexpr bool kStatistics = kSanitized;
 
+/// doctest::skip(kLong): minutes with sanitizers, through code that other test cases of the file run as well.
+inline constexpr bool kLong = kSanitized;
+
 }  // namespace ear::test
