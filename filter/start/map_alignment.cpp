@@ -37,17 +37,17 @@ NavState MapAlignment::to_world(const NavState& state_A) const {
 Eigen::Matrix<double, estimate_error::size, estimate_error::size> MapAlignment::to_world(
     const Eigen::Matrix<double, estimate_error::size, estimate_error::size>& covariance_A,
     const NavState& state_A) const {
-  using namespace estimate_error;
+  namespace at = estimate_error;
   const Eigen::Matrix3d R = q_WA.toRotationMatrix();
-  Eigen::Matrix<double, size, size> T = Eigen::Matrix<double, size, size>::Identity();
-  for (const int block : {rotation, velocity, position}) T.block<3, 3>(block, block) = R;
-  Eigen::Matrix<double, size, 1> by_yaw = Eigen::Matrix<double, size, 1>::Zero();
-  by_yaw.segment<3>(rotation) = Eigen::Vector3d::UnitZ();
-  by_yaw.segment<3>(velocity) = Eigen::Vector3d::UnitZ().cross(R * state_A.v_W);
-  by_yaw.segment<3>(position) = Eigen::Vector3d::UnitZ().cross(R * (state_A.p_WB - start_A));
-  Eigen::Matrix<double, size, size> P = T * covariance_A * T.transpose();
+  Eigen::Matrix<double, at::size, at::size> T = Eigen::Matrix<double, at::size, at::size>::Identity();
+  for (const int block : {at::rotation, at::velocity, at::position}) T.block<3, 3>(block, block) = R;
+  Eigen::Matrix<double, at::size, 1> by_yaw = Eigen::Matrix<double, at::size, 1>::Zero();
+  by_yaw.segment<3>(at::rotation) = Eigen::Vector3d::UnitZ();
+  by_yaw.segment<3>(at::velocity) = Eigen::Vector3d::UnitZ().cross(R * state_A.v_W);
+  by_yaw.segment<3>(at::position) = Eigen::Vector3d::UnitZ().cross(R * (state_A.p_WB - start_A));
+  Eigen::Matrix<double, at::size, at::size> P = T * covariance_A * T.transpose();
   P += yaw_sigma * yaw_sigma * by_yaw * by_yaw.transpose();
-  P.diagonal().segment<3>(position).array() += position_sigma * position_sigma;
+  P.diagonal().segment<3>(at::position).array() += position_sigma * position_sigma;
   return P;
 }
 
