@@ -14,8 +14,8 @@ void ImuPreintegration::add(const Eigen::Vector3d& gyro_B, const Eigen::Vector3d
   const Eigen::Vector3d f_B = accel_B - b_a_;
   const Eigen::Matrix3d R_G1 = R_BiBj_ * gamma<1>(phi);
   const Eigen::Matrix3d R_G2 = R_BiBj_ * gamma<2>(phi);
-  const Eigen::Vector3d dv = R_G1 * f_B * dt;
-  const Eigen::Vector3d dp = R_G2 * f_B * dt * dt;
+  const Eigen::Vector3d v_step = R_G1 * f_B * dt;
+  const Eigen::Vector3d p_step = R_G2 * f_B * dt * dt;
 
   // What an error of the rate, and one of the force, each constant over the piece, do to (xi, dv, dp).
   Eigen::Matrix<double, 9, 6> B = Eigen::Matrix<double, 9, 6>::Zero();
@@ -26,8 +26,8 @@ void ImuPreintegration::add(const Eigen::Vector3d& gyro_B, const Eigen::Vector3d
   B.block<3, 3>(imu_error::dp, 3) = -R_G2 * (dt * dt);
 
   Eigen::Matrix<double, size, size> F = Eigen::Matrix<double, size, size>::Identity();
-  F.block<3, 3>(imu_error::dv, xi) = -skew(dv);
-  F.block<3, 3>(imu_error::dp, xi) = -skew(dp);
+  F.block<3, 3>(imu_error::dv, xi) = -skew(v_step);
+  F.block<3, 3>(imu_error::dp, xi) = -skew(p_step);
   F.block<3, 3>(imu_error::dp, imu_error::dv).diagonal().setConstant(dt);
   F.block<9, 6>(xi, imu_error::b_g) = B;
   J_bias_ = (F.topLeftCorner<9, 9>() * J_bias_ + B).eval();
@@ -39,8 +39,8 @@ void ImuPreintegration::add(const Eigen::Vector3d& gyro_B, const Eigen::Vector3d
   Q_.diagonal().segment<3>(imu_error::b_g).array() += squared(noise.gyro_random_walk) * dt;
   Q_.diagonal().segment<3>(imu_error::b_a).array() += squared(noise.accel_random_walk) * dt;
 
-  dp_Bi_ += dv_Bi_ * dt + dp;
-  dv_Bi_ += dv;
+  dp_Bi_ += dv_Bi_ * dt + p_step;
+  dv_Bi_ += v_step;
   R_BiBj_ = renormalized(R_BiBj_ * exp_so3(phi));
   duration_ += dt;
 }
