@@ -88,7 +88,7 @@ void Filter::propagate_to(const FeatureFrame& frame) {
 /// A bias that jumped is as little known as at the start, and took the motion along until it was found out.
 void Filter::watch_biases(bool image) {
   const TimeNs t_ns = ekf_.state().imu.t_ns;
-  const BiasJump jumped = bias_watch_.judge(ekf_.take_bias_changes(), t_ns, image);
+  const ImuFault jumped = bias_watch_.judge(ekf_.take_bias_changes(), t_ns, image);
   if (!jumped.any()) return;
   const double gyro = jumped.gyro ? config_.prior.gyro_bias : 0.0;
   const double accel = jumped.accel ? config_.prior.accel_bias : 0.0;

@@ -12,11 +12,11 @@ constexpr double kSigmasWithoutImages = 12.0;  // measured on wheels of real rob
 
 }  // namespace
 
-BiasJump BiasWatch::judge(const BiasChanges& changes, TimeNs t_ns, bool image) {
+ImuFault BiasWatch::judge(const BiasChanges& changes, TimeNs t_ns, bool image) {
   if (changes.restarted) all_ = by_images_ = BiasChange{};
   all_.add(changes.all.correction, changes.all.variance_lowered);
   by_images_.add(changes.by_images.correction, changes.by_images.variance_lowered);
-  BiasJump jumped;
+  ImuFault jumped;
   const auto judge_by = [&jumped](const BiasChange& sum, double sigmas) {
     const BiasChange::Vector6 ratio = sum.correction.cwiseAbs2().cwiseQuotient(sum.variance_lowered.cwiseMax(1e-30));
     jumped.gyro = jumped.gyro || ratio.head<3>().maxCoeff() > sigmas * sigmas;

@@ -5,22 +5,16 @@
 
 #include "ear/types.h"
 #include "filter/ekf/records.h"
+#include "filter/ingest/imu_spike.h"
 
 namespace ear {
-
-/// Which of the inertial sensors' biases jumped?
-struct BiasJump {
-  bool gyro = false;
-  bool accel = false;
-  [[nodiscard]] bool any() const { return gyro || accel; }
-};
 
 class BiasWatch {
  public:
   /// What all updates since the last call did, the state now being at `t_ns`, with an image (`image`) or without: then
   /// it takes more, for wheels that slip for long look like a bias that jumped. What speaks for a jump is forgotten
   /// when it was reported. Updates by images count sooner: wheels that leave the ground unnoticed mislead.
-  BiasJump judge(const BiasChanges& changes, TimeNs t_ns, bool image);
+  ImuFault judge(const BiasChanges& changes, TimeNs t_ns, bool image);
 
  private:
   BiasChange all_, by_images_;

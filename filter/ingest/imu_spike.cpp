@@ -14,7 +14,7 @@ bool is_spike(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::V
 
 }  // namespace
 
-ImuSpike find_spike(const ImuSample& before, const ImuSample& suspect, const ImuSample& after) {
+ImuFault find_spike(const ImuSample& before, const ImuSample& suspect, const ImuSample& after) {
   return {is_spike(before.gyro_B, suspect.gyro_B, after.gyro_B, kGyroSpike),
           is_spike(before.accel_B, suspect.accel_B, after.accel_B, kAccelSpike)};
 }

@@ -6,13 +6,14 @@
 
 namespace ear {
 
-struct ImuSpike {
+/// Which of the inertial sensors is at fault?
+struct ImuFault {
   bool gyro = false;
   bool accel = false;
   [[nodiscard]] bool any() const { return gyro || accel; }
 };
 
 /// Is `suspect` one, between its neighbours?
-[[nodiscard]] ImuSpike find_spike(const ImuSample& before, const ImuSample& suspect, const ImuSample& after);
+[[nodiscard]] ImuFault find_spike(const ImuSample& before, const ImuSample& suspect, const ImuSample& after);
 
 }  // namespace ear

@@ -49,7 +49,7 @@ ImuVerdict Ingest::judge(const ImuSample& sample) {
 }
 
 ImuFault Ingest::store(const ImuSample& sample) {
-  ImuSpike spike;
+  ImuFault spike;
   if (imu_.size() >= 2) {
     const ImuSample& before = imu_[imu_.size() - 2];
     if (seconds_between(before.t_ns, sample.t_ns) <= config_.max_imu_gap)

@@ -28,12 +28,6 @@ struct Measurement {
   BeamRanges ranges;
 };
 
-/// Which of the inertial sensors is at fault?
-struct ImuFault {
-  bool gyro = false;
-  bool accel = false;
-};
-
 class Ingest {
  public:
   Ingest(const FilterConfig& config, const Calibration& calibration);

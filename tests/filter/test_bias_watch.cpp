@@ -25,7 +25,7 @@ class Tracker {
  public:
   Tracker(double walk, double noise) : walk_(walk), noise_(noise) {}
 
-  BiasJump step(const Vector6& truth, std::mt19937_64& rng) {
+  ImuFault step(const Vector6& truth, std::mt19937_64& rng) {
     std::normal_distribution<double> normal;
     Vector6 correction, lowered;
     for (int i = 0; i < 6; ++i) {
@@ -58,7 +58,7 @@ TEST_CASE("bias_watch: biases that walk as expected do not jump, in an hour") {
   int jumps = 0;
   for (int i = 0; i < 30 * 3600; ++i) {
     for (int k = 0; k < 6; ++k) truth(k) += 1e-3 * std::sqrt(kDt) * normal(rng);
-    const BiasJump verdict = tracker.step(truth, rng);
+    const ImuFault verdict = tracker.step(truth, rng);
     jumps += verdict.gyro || verdict.accel ? 1 : 0;
   }
   CHECK(jumps == 0);
@@ -73,7 +73,7 @@ TEST_CASE("bias_watch: a jump of either sensor is found within half a second, an
     for (int i = 0; i < 300; ++i) (void)tracker.step(truth, rng);
     truth(accel ? 4 : 1) = 0.5;
     int frames = 0;
-    BiasJump verdict;
+    ImuFault verdict;
     while (!verdict.gyro && !verdict.accel && frames < 300) {
       verdict = tracker.step(truth, rng);
       ++frames;

@@ -32,7 +32,6 @@ class Ground {
   [[nodiscard]] bool rolls_at(TimeNs t_ns) const;
   /// Have the lasers seen the ground since it was last touched?
   [[nodiscard]] bool known() const { return running_.known; }
-  [[nodiscard]] const std::optional<LaserCalibration>& lasers() const { return lasers_; }
   /// Beams that give the same range again and again.
   [[nodiscard]] std::bitset<kMaxBeams> stuck_beams() const { return contact_.stuck_beams(); }
 
