@@ -279,6 +279,7 @@ TEST_CASE("C interface: a thread for each sensor, one for the estimates") {
   settings.frame_slots = 2;
   const Handle odometry = make(&settings);
   std::atomic<TimeNs> now{simulation.imu().front().t_ns};  // no sensor gives samples of the future
+  std::atomic<TimeNs> imu_given{now.load()};               // the clock waits for the IMU, however busy the machine is
 
   const auto sensor = [&](std::size_t count, const std::function<TimeNs(std::size_t)>& arrival,
                           const std::function<ear_result(std::size_t)>& add) {
@@ -295,7 +296,9 @@ TEST_CASE("C interface: a thread for each sensor, one for the estimates") {
       simulation.imu().size(), [&](std::size_t i) { return simulation.imu()[i].t_ns; },
       [&](std::size_t i) {
         const ear_imu_sample sample = d.imu(i);
-        return ear_add_imu(odometry.get(), &sample);
+        const ear_result result = ear_add_imu(odometry.get(), &sample);
+        if (result != EAR_QUEUE_FULL) imu_given = sample.t_ns;
+        return result;
       }));
   sensors.push_back(sensor(
       simulation.encoders().size(), [&](std::size_t i) { return simulation.encoders()[i].t_ns; },
@@ -318,6 +321,7 @@ TEST_CASE("C interface: a thread for each sensor, one for the estimates") {
   std::thread clock([&] {
     for (; now < simulation.imu().back().t_ns + 1'000'000'000; now += 10'000'000) {
       std::this_thread::sleep_for(std::chrono::milliseconds(2));
+      while (imu_given < std::min(now.load(), simulation.imu().back().t_ns) - 10'000'000) std::this_thread::yield();
     }
     for (std::thread& thread : sensors) {
       thread.join();
