@@ -1,6 +1,7 @@
 // The C interface against class Odometry: the same samples give the same estimates, through threads and errors too.
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cmath>
