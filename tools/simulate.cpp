@@ -75,8 +75,14 @@ void add_simulate_command(CLI::App& app) {
       ->capture_default_str();
   command->add_option("--duration", args->options.duration, "[s] stop earlier, or keep standing at the end");
   command->add_option("--camera-rate", args->options.camera_rate_hz, "[Hz]")->capture_default_str();
-  command->add_flag("--perfect-calibration", args->options.perfect_calibration,
-                    "write the true calibration instead of a slightly wrong one; all else stays the same");
+  CLI::Option* calibration_error =
+      command->add_option("--calibration-error", args->options.calibration_error,
+                          "errors of the calibration that is written, times those of real rigs: 0 none, 1 as they are; "
+                          "without it errors of fixed sizes");
+  command
+      ->add_flag_callback(
+          "--perfect-calibration", [args] { args->options.calibration_error = 0.0; }, "--calibration-error 0")
+      ->excludes(calibration_error);
   command->add_option("--fault", args->faults, "what goes wrong, as NAME@START+DURATION (below); may be repeated");
   CLI::Option* no_images = command->add_flag("--no-images", args->no_images, "everything but the pictures");
   command

@@ -94,7 +94,7 @@ Nees run(const Case& setup, std::uint64_t seed) {
   simulator::Options options;
   options.sequence = setup.sequence;
   options.seed = seed;
-  options.perfect_calibration = !setup.calibrate;
+  if (!setup.calibrate) options.calibration_error = 0.0;
   options.duration = kDuration;
   const simulator::Simulation simulation(options);
   Filter filter(setup.shipped ? FilterConfig{} : simulated_noise(setup, options), simulation.calibration());

@@ -19,7 +19,7 @@ simulator::Simulation simulate(const char* sequence, double duration, bool perfe
   options.sequence = sequence;
   options.seed = 8101;
   options.duration = duration;
-  options.perfect_calibration = perfect;
+  if (perfect) options.calibration_error = 0.0;
   return simulator::Simulation(options);
 }
 
@@ -139,7 +139,7 @@ TEST_CASE("filter: swaying in view of the same features all the time it stays wh
   simulator::Options options;
   options.sequence = "sway3";
   options.seed = 8102;
-  options.perfect_calibration = true;
+  options.calibration_error = 0.0;
   options.track.mean_life = 1e6;
   const simulator::Simulation simulation(options);
   FilterConfig config;

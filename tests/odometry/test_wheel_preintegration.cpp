@@ -21,7 +21,7 @@ simulator::Simulation simulate(const std::string& sequence) {
   simulator::Options options;
   options.sequence = sequence;
   options.seed = 8201;
-  options.perfect_calibration = true;
+  options.calibration_error = 0.0;
   options.sensor_noise = false;
   options.tracks = false;
   return simulator::Simulation(options);

@@ -13,7 +13,7 @@ TEST_CASE("changed samples: a body that sways on standing wheels turns the chang
   options.duration = 12.0;
   options.sensor_noise = false;
   options.tracks = false;
-  options.perfect_calibration = true;
+  options.calibration_error = 0.0;
   const simulator::Simulation simulation(options);
   const WithoutPitch change(simulation, simulation.calibration());
   const auto resolution = simulation.calibration().encoder->resolution;

@@ -1,9 +1,9 @@
 // The estimates of whole runs on simulated feature tracks, one line a run and one a few seconds: what a change of the
 // code must leave as it is. `replays REFERENCE` compares with the committed ones, `replays` prints new ones.
 //
-// All fifteen sequences at one seed, with all sensors and by cameras and IMU alone, and some with faults. A run's
-// digest is of every bit of every estimate: it may differ where another compiler rounds otherwise, and is shown only.
-// Positions must agree within kTolerance.
+// All fifteen sequences at one seed, with all sensors and by cameras and IMU alone, some with faults and some with a
+// calibration error (without one the errors are of fixed sizes). A run's digest is of every bit of every estimate: it
+// may differ where another compiler rounds otherwise, and is shown only. Positions must agree within kTolerance.
 #include <cinttypes>
 #include <cmath>
 #include <cstdint>
@@ -12,6 +12,7 @@
 #include <fstream>
 #include <iostream>
 #include <iterator>
+#include <optional>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -34,9 +35,13 @@ struct Run {
   std::string sequence;
   std::string fault;
   bool wheels = true;
+  std::optional<double> calibration_error = std::nullopt;  ///< simulator::Options::calibration_error
 
   [[nodiscard]] std::string name() const {
-    return sequence + (wheels ? "" : "/stereo_inertial") + (fault.empty() ? "" : "/" + fault);
+    std::ostringstream text;
+    text << sequence << (wheels ? "" : "/stereo_inertial") << (fault.empty() ? "" : "/" + fault);
+    if (calibration_error) text << "/calibration_error=" << *calibration_error;
+    return text.str();
   }
 };
 
@@ -54,6 +59,7 @@ std::vector<Run> all_runs() {
       runs.push_back({sequence, fault, true});
     }
   }
+  for (const std::string sequence : {"flat1", "fly1"}) runs.push_back({sequence, "", true, 1.0});
   return runs;
 }
 
@@ -74,6 +80,7 @@ void replay(const Run& run, std::ostream& out) {
   simulator::Options options;
   options.sequence = run.sequence;
   options.seed = kSeed;
+  options.calibration_error = run.calibration_error;
   if (!run.fault.empty()) {
     options.faults.push_back(simulator::parse_fault(run.fault));
     options.duration = kShortRun;

@@ -69,6 +69,7 @@ TEST_CASE("recording: the reader gets back calibration and samples") {
   Options options = short_drive(41);
   options.duration = 4.0;
   options.k3 = -0.0125;
+  options.calibration_error = 1.0;
   const Simulation simulation(options);
   write_recording(simulation, folder / "r");
 
@@ -89,7 +90,13 @@ TEST_CASE("recording: the reader gets back calibration and samples") {
     CHECK((read.lasers->beams[i].p_BL - told.lasers->beams[i].p_BL).norm() < 1e-8);
   }
 
-  CHECK(read.cameras[0].distortion == told.cameras[0].distortion);
+  for (std::size_t i = 0; i < 2; ++i) {
+    CHECK(read.cameras[i].distortion == told.cameras[i].distortion);
+    CHECK(read.cameras[i].fu == doctest::Approx(told.cameras[i].fu).epsilon(1e-8));
+    CHECK(read.cameras[i].cu == doctest::Approx(told.cameras[i].cu).epsilon(1e-8));
+    CHECK((read.cameras[i].T_BC.matrix() - told.cameras[i].T_BC.matrix()).norm() < 1e-9);
+  }
+  CHECK(std::abs(read.camera_time_offset - told.camera_time_offset) < 1e-8);
 
   std::size_t imu = 0;
   std::size_t encoders = 0;
@@ -166,8 +173,10 @@ TEST_CASE("recording: pictures do not depend on the threads, and serve the other
   const TemporaryFolder folder;
   Options options = short_drive(45);
   const Simulation imperfect(options);
-  options.perfect_calibration = true;
+  options.calibration_error = 0.0;
   const Simulation perfect(options);
+  options.calibration_error = 1.0;
+  const Simulation wrong(options);
   write_recording(imperfect, folder / "imperfect");
   std::size_t told = 0;
   render_images(imperfect, all_pictures(imperfect), folder / "imperfect", 1, [&](std::size_t done, std::size_t total) {
@@ -176,6 +185,7 @@ TEST_CASE("recording: pictures do not depend on the threads, and serve the other
   });
   CHECK(told == 2 * imperfect.frame_times().size());
   render_images(imperfect, all_pictures(imperfect), folder / "threads", 3, no_progress);
+  render_images(wrong, all_pictures(wrong), folder / "wrong", 1, no_progress);
   write_recording(perfect, folder / "perfect");
   CHECK_NOTHROW(require_same_pictures(perfect, folder / "imperfect"));
   CHECK(link_images(perfect, folder / "perfect", folder / "imperfect").empty());
@@ -185,10 +195,13 @@ TEST_CASE("recording: pictures do not depend on the threads, and serve the other
       CHECK(bytes.size() > 50000);
       CHECK(bytes == bytes_of(image_path(folder / "threads", camera, t_ns)));
       CHECK(bytes == bytes_of(image_path(folder / "perfect", camera, t_ns)));
+      CHECK(bytes == bytes_of(image_path(folder / "wrong", camera, t_ns)));
     }
   }
   CHECK(bytes_of(folder / "perfect/mav0/imu0/data.csv") == bytes_of(folder / "imperfect/mav0/imu0/data.csv"));
   CHECK(bytes_of(folder / "perfect/mav0/cam0/sensor.yaml") != bytes_of(folder / "imperfect/mav0/cam0/sensor.yaml"));
+
+  CHECK_NOTHROW(require_same_pictures(wrong, folder / "imperfect"));
 
   const Simulation other(short_drive(46));
   CHECK_THROWS_WITH_AS(require_same_pictures(other, folder / "imperfect"), doctest::Contains("seed: 46"),

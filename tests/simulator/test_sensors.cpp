@@ -273,13 +273,13 @@ TEST_CASE("lasers: as many readings are lost and wrong as the faults say; withou
     return readings;
   };
   CHECK(count(with({}), [](double range) { return range != 0.5; }) == 0.0);
-  CHECK(count(with({0.03, 0.0, 0.0}), lost) == doctest::Approx(0.03).epsilon(0.1));
+  CHECK(count(with({0.03, 0.0, 0.0}), lost) == doctest::Approx(0.03).epsilon(0.1).scale(0.0));
   const std::vector<LaserSample> wrong = with({0.0, 0.04, 0.0});
   CHECK(count(wrong, lost) == 0.0);
-  CHECK(count(wrong, nearer) == doctest::Approx(0.03).epsilon(0.1));
-  CHECK(count(wrong, farther) == doctest::Approx(0.01).epsilon(0.2));
+  CHECK(count(wrong, nearer) == doctest::Approx(0.03).epsilon(0.1).scale(0.0));
+  CHECK(count(wrong, farther) == doctest::Approx(0.01).epsilon(0.2).scale(0.0));
   // 0.05 fades per second of 0.6 s in the mean: 3 % of the time, in runs.
-  CHECK(count(with({0.0, 0.0, 0.05}), lost) == doctest::Approx(0.03).epsilon(0.4));
+  CHECK(count(with({0.0, 0.0, 0.05}), lost) == doctest::Approx(0.03).epsilon(0.4).scale(0.0));
 }
 
 TEST_CASE("lasers: a sequence with faults has them, the flat floor none") {
@@ -370,8 +370,8 @@ TEST_CASE("simulation: initial biases are of the promised size") {
     gyro.push_back(bias.gyro.norm());
     accel.push_back(bias.accel.norm());
   }
-  CHECK(moments(gyro).mean == doctest::Approx(5e-3).epsilon(0.1));
-  CHECK(moments(accel).mean == doctest::Approx(0.05).epsilon(0.1));
+  CHECK(moments(gyro).mean == doctest::Approx(5e-3).epsilon(0.1).scale(0.0));
+  CHECK(moments(accel).mean == doctest::Approx(0.05).epsilon(0.1).scale(0.0));
 }
 
 TEST_CASE("simulation: the same seed gives the same data, another seed other data") {
@@ -393,41 +393,6 @@ TEST_CASE("simulation: the same seed gives the same data, another seed other dat
   CHECK(first.tracks(250).features[40].left == again.tracks(250).features[40].left);
   CHECK(first.imu()[100].gyro_B != other.imu()[100].gyro_B);
   CHECK(first.truth(first.imu()[1500].t_ns).p_WB != other.truth(first.imu()[1500].t_ns).p_WB);
-}
-
-TEST_CASE("simulation: the calibration told is wrong by what is promised; the data do not depend on it") {
-  Options options;
-  options.seed = 18;
-  options.duration = 3.0;
-  const Simulation imperfect(options);
-  options.perfect_calibration = true;
-  const Simulation perfect(options);
-  const ear::Calibration& told = imperfect.calibration();
-  const ear::Calibration& truth = imperfect.true_calibration();
-  const auto angle = [](const Eigen::Matrix3d& a, const Eigen::Matrix3d& b) {
-    return Eigen::AngleAxisd(Eigen::Matrix3d(a.transpose() * b)).angle() / kDegree;
-  };
-
-  CHECK(std::abs(told.encoder->wheel_radius[0] / 0.075 - 1.0) == doctest::Approx(0.003).epsilon(0.06));
-  CHECK(std::abs(told.encoder->wheel_radius[1] / 0.075 - 1.0) == doctest::Approx(0.003).epsilon(0.06));
-  CHECK(std::abs(told.encoder->track_width / 0.40 - 1.0) == doctest::Approx(0.003));
-  CHECK(angle(told.encoder->T_BO.linear(), truth.encoder->T_BO.linear()) == doctest::Approx(0.2));
-  for (std::size_t i = 0; i < 3; ++i) {
-    const double cosine = told.lasers->beams[i].d_B.dot(truth.lasers->beams[i].d_B);
-    CHECK(std::acos(cosine) / kDegree == doctest::Approx(0.2).epsilon(1e-3));
-  }
-  CHECK(angle(told.cameras[0].T_BC.linear(), truth.cameras[0].T_BC.linear()) == doctest::Approx(0.2));
-  const Eigen::Isometry3d told_pair = told.cameras[0].T_BC.inverse() * told.cameras[1].T_BC;
-  const Eigen::Isometry3d true_pair = truth.cameras[0].T_BC.inverse() * truth.cameras[1].T_BC;
-  CHECK(angle(told_pair.linear(), true_pair.linear()) == doctest::Approx(0.02).epsilon(1e-3));
-  CHECK((told_pair.translation() - true_pair.translation()).norm() < 1e-12);
-  CHECK(told.cameras[0].fu == truth.cameras[0].fu);
-  CHECK(std::abs(told.camera_time_offset) == doctest::Approx(0.001));
-
-  CHECK(perfect.calibration().cameras[0].T_BC.matrix() == truth.cameras[0].T_BC.matrix());
-  CHECK(perfect.calibration().camera_time_offset == 0.0);
-  CHECK(perfect.imu()[200].gyro_B == imperfect.imu()[200].gyro_B);
-  CHECK(perfect.tracks(50).features[10].left == imperfect.tracks(50).features[10].left);
 }
 
 TEST_CASE("simulation: what does not exist is said by name") {

@@ -4,8 +4,8 @@
     tools/benchmarks/accuracy.py EAR [--sequences flat1 fly1 | all] [--seeds 101 102] [--odometer none terrain]
                                  [--calibration true wrong] [--work DIR] [--keep]
 
-Every recording is run with the true calibration and with the slightly wrong one; the pictures are rendered once.
-Recordings that are in DIR already, as SEQUENCE_SEED (wrong) and SEQUENCE_SEED_true, are used and left there. What
+Every recording is run with the true calibration and with a wrong one (CALIBRATION_ERROR); the pictures are rendered
+once. Recordings that are in DIR already, as SEQUENCE_SEED_wrong and SEQUENCE_SEED_true, are used and left there. What
 `ear run` wrote stays in DIR/runs.
 """
 import argparse
@@ -15,6 +15,9 @@ import shutil
 import statistics
 import subprocess
 from pathlib import Path
+
+# `ear simulate --calibration-error` of each calibration.
+CALIBRATION_ERROR = {"true": 0, "wrong": 1}
 
 # Columns of the table: title, path of the figure in the evaluation's JSON, factor, decimals.
 COLUMNS = [
@@ -46,13 +49,13 @@ def all_sequences(ear):
 
 def recording(ear, sequence, seed, calibration, work, made):
     """The recording's folder, made if it is not there yet; pictures come from its sibling where that is there."""
-    folders = {"true": work / f"{sequence}_{seed}_true", "wrong": work / f"{sequence}_{seed}"}
+    folders = {name: work / f"{sequence}_{seed}_{name}" for name in CALIBRATION_ERROR}
     folder = folders.pop(calibration)
     (sibling,) = folders.values()
     if not folder.exists():
         made.append(folder)
         call(ear, "simulate", sequence, "--seed", seed, "--out", folder,
-             *(["--perfect-calibration"] if calibration == "true" else []),
+             "--calibration-error", CALIBRATION_ERROR[calibration],
              *(["--images-from", sibling] if sibling.exists() else []))
     return folder
 
@@ -91,7 +94,7 @@ def main():
     parser.add_argument("--sequences", nargs="+", default=["flat1", "fly1"])
     parser.add_argument("--seeds", nargs="+", type=int, default=[101, 102, 103, 104, 105])
     parser.add_argument("--odometer", nargs="+", default=[None], help="models to compare; without: the default")
-    parser.add_argument("--calibration", nargs="+", choices=["true", "wrong"], default=["true", "wrong"])
+    parser.add_argument("--calibration", nargs="+", choices=list(CALIBRATION_ERROR), default=list(CALIBRATION_ERROR))
     parser.add_argument("--work", type=Path, default=Path("build/accuracy"))
     parser.add_argument("--keep", action="store_true", help="keep the recordings that it makes, about 1 GB each")
     args = parser.parse_args()

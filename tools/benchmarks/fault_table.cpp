@@ -392,6 +392,7 @@ std::vector<simulator::Options> simulations_of(const Arguments& args) {
       options.sequence = sequence;
       options.seed = seed;
       options.camera_rate_hz = args.camera_rate_hz;
+      options.calibration_error = 1.0;
       simulations.push_back(options);
     }
   }

@@ -51,6 +51,7 @@ simulator::Simulation simulate(const std::string& sequence, std::uint64_t seed) 
   options.sequence = sequence;
   options.seed = seed;
   options.camera_rate_hz = kRate;
+  options.calibration_error = 1.0;
   return simulator::Simulation(options);
 }
 
@@ -87,6 +88,7 @@ simulator::Options beginning(const std::string& sequence, double duration) {
   options.sequence = sequence;
   options.duration = duration;
   options.camera_rate_hz = kRate;
+  options.calibration_error = 1.0;
   return options;
 }
 

@@ -32,6 +32,7 @@ struct Arguments {
   std::vector<std::string> sequences{"all"};
   std::vector<std::string> seeds{"501..505"};
   std::string calibration = "both";
+  double calibration_error = 1.0;  ///< of the wrong one
   std::vector<OdometerModel> odometers;
   std::vector<std::string> estimators;
   bool without_camera = false;
@@ -120,17 +121,23 @@ std::vector<Variant> variants_of(const Arguments& args) {
   return variants;
 }
 
-/// All variants on one simulation: the samples do not depend on the calibration told.
+/// All variants on the same drive: the calibration told changes no sample but those of the accelerometer, by its bias.
 std::vector<Run> run(const simulator::Options& options, const std::vector<Variant>& variants, const Arguments& args) {
-  const simulator::Simulation simulation(options);
+  std::optional<simulator::Simulation> simulation;
   std::vector<Run> runs;
   for (const Variant& variant : variants) {
-    Calibration told = variant.true_calibration ? simulation.true_calibration() : simulation.calibration();
+    const double calibration_error = variant.true_calibration ? 0.0 : args.calibration_error;
+    if (!simulation || simulation->options().calibration_error != calibration_error) {
+      simulator::Options told_options = options;
+      told_options.calibration_error = calibration_error;
+      simulation.emplace(told_options);
+    }
+    Calibration told = simulation->calibration();
     if (args.without_camera) told.cameras.clear();
     const Setup setup{options.sequence, options.camera_rate_hz, name_of(variant.config.odometer.model),
                       variant.true_calibration, variant.settings};
     runs.push_back(
-        {setup, options.seed, measure(simulation, told, variant.config, args.alignment, {}, variant.estimator)});
+        {setup, options.seed, measure(*simulation, told, variant.config, args.alignment, {}, variant.estimator)});
   }
   return runs;
 }
@@ -164,6 +171,8 @@ int parse_and_run(int argc, char** argv) {
   app.add_option("--seeds", args.seeds, "7 or 501..505, several with commas")->delimiter(',')->capture_default_str();
   app.add_option("--calibration", args.calibration, "that the filter is told")
       ->check(CLI::IsMember({"true", "wrong", "both"}))
+      ->capture_default_str();
+  app.add_option("--calibration-error", args.calibration_error, "of the wrong one, as in ear simulate")
       ->capture_default_str();
   std::map<std::string, OdometerModel> models;
   for (const auto& [name, model] : names_of(OdometerModel{})) models.emplace(name, model);

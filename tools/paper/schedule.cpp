@@ -21,8 +21,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kFullRate = 30.0;        // [Hz] of a recording's camera
-constexpr double kBytesPerSecond = 14e6;  // of a recording with images
+constexpr double kFullRate = 30.0;         // [Hz] of a recording's camera
+constexpr double kCalibrationError = 1.0;  // simulator::Options::calibration_error
+constexpr double kBytesPerSecond = 14e6;   // of a recording with images
 
 // Processor time of each piece of work, per second of a recording [s]: for the time that is left.
 constexpr double kRenderCost = 2.5;
@@ -57,7 +58,8 @@ std::string hash_of(const std::string& text) {
 /// What a simulation depends on, but for the camera's rate.
 std::string simulation_text(const Conditions& c, const std::string& sequence, std::uint64_t seed) {
   return "simulator " + simulator_sources() + "\n" + sequence + " " + std::to_string(seed) + " " +
-         (c.duration ? std::to_string(*c.duration) : "whole") + "\n";
+         (c.duration ? std::to_string(*c.duration) : "whole") + " calibration error " +
+         std::to_string(kCalibrationError) + "\n";
 }
 
 fs::path recording_folder(const Conditions& c, const Job& job) {
@@ -114,6 +116,7 @@ simulator::Options options_of(const Conditions& c, const Job& job) {
   options.duration = c.duration;
   options.camera_rate_hz = job.camera_rate_hz;
   options.tracks = c.tracks;
+  options.calibration_error = kCalibrationError;
   return options;
 }
 

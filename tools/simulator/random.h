@@ -23,7 +23,8 @@ enum class Stream : std::uint32_t {
   pixels = 9,
   laser_faults = 10,
   obstruction = 11,
-  faults = 12
+  faults = 12,
+  calibration_errors = 13
 };
 
 [[nodiscard]] inline Rng make_rng(std::uint64_t seed, Stream stream) {

@@ -6,6 +6,7 @@
 #include <cstdarg>
 #include <cstdio>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <vector>
 
@@ -210,7 +211,11 @@ void write_origin(const Simulation& simulation, const fs::path& directory) {
   TextFile yaml(origin_file(directory));
   yaml.print("# What made this recording. The first lines decide which pictures it can share with another one.\n");
   for (const std::string& line : picture_origin(simulation)) yaml.print("%s\n", line.c_str());
-  yaml.print("perfect_calibration: %s\n", simulation.options().perfect_calibration ? "true" : "false");
+  if (const std::optional<double>& error = simulation.options().calibration_error) {
+    yaml.print("calibration_error: %g\n", *error);
+  } else {
+    yaml.print("calibration_error: fixed sizes\n");
+  }
   yaml.print("faults:%s\n", simulation.options().faults.empty() ? " []" : "");
   for (const Fault& fault : simulation.options().faults) yaml.print("  - %s\n", to_string(fault).c_str());
   yaml.close();

@@ -8,8 +8,7 @@
 namespace ear::simulator {
 namespace {
 
-constexpr double kInitialGyroBias = 3e-3;   // [rad/s] per axis
-constexpr double kInitialAccelBias = 0.03;  // [m/s^2] per axis
+constexpr double kInitialGyroBias = 3e-3;  // [rad/s] per axis
 
 // Gauss-Legendre, three points on [0, 1]: exact for polynomials of degree 5.
 constexpr std::array<double, 3> kNodes{0.11270166537925831, 0.5, 0.88729833462074169};

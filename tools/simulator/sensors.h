@@ -27,6 +27,9 @@ struct ImuBias {
   Eigen::Vector3d accel = Eigen::Vector3d::Zero();
 };
 
+/// One sigma of the accelerometer's initial bias [m/s^2], per axis.
+inline constexpr double kInitialAccelBias = 0.03;
+
 /// Random walks from random initial values (about 5e-3 rad/s and 0.05 m/s^2), one bias per stamp.
 [[nodiscard]] std::vector<ImuBias> draw_imu_biases(const ImuCalibration& imu, std::size_t count, Rng& rng);
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "tools/simulator/calibration_error.h"
 #include "tools/simulator/sensor_faults.h"
 #include "tools/simulator/sequence.h"
 #include "tools/simulator/track_faults.h"
@@ -23,6 +24,10 @@ Options checked(const Options& options) {
   if (!(options.camera_rate_hz > 0.0)) throw std::invalid_argument("the camera rate must be positive");
   if (options.duration && !(*options.duration > 0.0)) throw std::invalid_argument("the duration must be positive");
   for (const Fault& fault : options.faults) require_valid(fault);
+  const double calibration_error = options.calibration_error.value_or(0.0);
+  if (!(calibration_error >= 0.0 && std::isfinite(calibration_error))) {
+    throw std::invalid_argument("the calibration error must be a factor of zero or more");
+  }
   if (options.k3 != 0.0 && options.lens != LensModel::radial_tangential) {
     throw std::invalid_argument("k3: of radial-tangential lenses only");
   }
@@ -44,9 +49,12 @@ Sequence varied_sequence(const Options& options) {
 }
 
 Calibration told_calibration(const Options& options, const Calibration& truth) {
-  if (options.perfect_calibration) return truth;
-  Rng rng = make_rng(options.seed, Stream::calibration);
-  return miscalibrate(truth, rng);
+  if (!options.calibration_error) {
+    Rng rng = make_rng(options.seed, Stream::calibration);
+    return with_fixed_errors(truth, rng);
+  }
+  if (*options.calibration_error == 0.0) return truth;
+  return with_errors(truth, draw_calibration_errors(options.seed, *options.calibration_error));
 }
 
 std::shared_ptr<const MotionPlan> planned(const Options& options, const Sequence& sequence,
@@ -100,6 +108,13 @@ Calibration sensors_of(const Options& options, Calibration calibration) {
   return calibration;
 }
 
+std::vector<ImuBias> drawn_biases(const Options& options, const ImuCalibration& imu, std::size_t count, Rng& rng) {
+  std::vector<ImuBias> biases = draw_imu_biases(imu, count, rng);
+  const CalibrationErrors errors = draw_calibration_errors(options.seed, options.calibration_error.value_or(0.0));
+  for (ImuBias& bias : biases) bias.accel += errors.accel_bias;
+  return biases;
+}
+
 Calibration vehicle_of(const Options& options) {
   Calibration vehicle = make_vehicle(options.camera_rate_hz, options.lens);
   for (CameraCalibration& camera : vehicle.cameras) camera.distortion[4] = options.k3;
@@ -137,7 +152,7 @@ Simulation::Simulation(const Options& options, const Sequence& sequence)
   imu_ = ideal_imu(trajectory, truth_times_, sensors.imu.rate_hz);
   biases_.assign(truth_times_.size(), ImuBias{});
   if (options.sensor_noise) {
-    biases_ = draw_imu_biases(sensors.imu, truth_times_.size(), imu_rng);
+    biases_ = drawn_biases(options, sensors.imu, truth_times_.size(), imu_rng);
     corrupt_imu(imu_, sensors.imu, biases_, imu_rng);
   }
   fault_imu(imu_, biases_, options.faults, options.seed);

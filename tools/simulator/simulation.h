@@ -30,9 +30,8 @@ namespace ear::simulator {
 
 struct Options {
   std::string sequence = "flat1";
-  std::uint64_t seed = 1;            ///< varies noise, biases, landmarks, calibration errors and details of the motion
-  bool perfect_calibration = false;  ///< calibration() is the true one; changes no sample
-  std::optional<double> duration;    ///< [s] stop earlier, or keep standing at the end for longer
+  std::uint64_t seed = 1;          ///< varies noise, biases, landmarks, calibration errors and details of the motion
+  std::optional<double> duration;  ///< [s] stop earlier, or keep standing at the end for longer
   double camera_rate_hz = 30.0;
   LensModel lens = LensModel::radial_tangential;
   bool sensor_noise = true;  ///< false: IMU without noise and biases, encoders and lasers without noise and faults
@@ -40,6 +39,9 @@ struct Options {
   TrackOptions track;
   std::vector<Fault> faults = {};  ///< what else goes wrong; all that they do not hit stays, sample for sample
   double k3 = 0.0;                 ///< of both lenses, which must be radial-tangential then
+  /// How wrong calibration() is, in the sizes of draw_calibration_errors(): 0 is the true one. The accelerometer's true
+  /// bias grows with it; all other samples, the motion and the truth stay. Without it: with_fixed_errors().
+  std::optional<double> calibration_error = std::nullopt;
 };
 
 /// The truth at one instant. World W: z up, the origin in a corner of the room.
@@ -68,11 +70,11 @@ struct Delivery {
 
 class Simulation {
  public:
-  /// Throws std::invalid_argument for a sequence that does not exist, a duration or rate that is not positive, or a
-  /// fault that cannot be.
+  /// Throws std::invalid_argument for a sequence that does not exist, a duration or rate that is not positive, a
+  /// calibration error below zero, or a fault that cannot be.
   explicit Simulation(const Options& options);
 
-  /// What the estimator is told; slightly wrong unless Options::perfect_calibration.
+  /// What the estimator is told, as wrong as Options::calibration_error says.
   [[nodiscard]] const Calibration& calibration() const { return calibration_; }
   [[nodiscard]] const Calibration& true_calibration() const { return true_calibration_; }
 

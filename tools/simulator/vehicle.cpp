@@ -8,12 +8,6 @@
 namespace ear::simulator {
 namespace {
 
-constexpr double kMountingError = 0.2 * kDegree;
-constexpr double kStereoError = 0.02 * kDegree;
-constexpr double kScaleError = 0.003;
-constexpr double kRadiusDifference = 0.0003;  // of left and right, in the same unit
-constexpr double kTimeError = 0.001;          // [s]
-
 Eigen::Matrix3d rotation(double roll_deg, double pitch_deg, double yaw_deg) {
   return (Eigen::AngleAxisd(yaw_deg * kDegree, Eigen::Vector3d::UnitZ()) *
           Eigen::AngleAxisd(pitch_deg * kDegree, Eigen::Vector3d::UnitY()) *
@@ -45,12 +39,6 @@ CameraCalibration make_camera(double rate_hz, LensModel lens) {
   camera.lens = lens;
   return camera;
 }
-
-Eigen::Matrix3d random_rotation(Rng& rng, double angle) {
-  return Eigen::AngleAxisd(angle, random_direction(rng)).toRotationMatrix();
-}
-
-double random_sign(Rng& rng) { return uniform(rng, -1.0, 1.0) < 0.0 ? -1.0 : 1.0; }
 
 }  // namespace
 
@@ -90,35 +78,6 @@ Calibration make_vehicle(double camera_rate_hz, LensModel lens) {
                   {"front_right", {0.10, -0.11, -0.027}, rotation(-1.0, 0.7, 0.0) * -Eigen::Vector3d::UnitZ()},
                   {"rear", {-0.16, -0.002, -0.019}, rotation(0.4, -1.2, 0.0) * -Eigen::Vector3d::UnitZ()}};
   calibration.lasers = lasers;
-  return calibration;
-}
-
-Calibration miscalibrate(Calibration calibration, Rng& rng) {
-  EncoderCalibration& encoder = *calibration.encoder;
-  const double radius_error = random_sign(rng) * kScaleError;
-  const double radius_difference = random_sign(rng) * kRadiusDifference;
-  encoder.wheel_radius[0] *= 1.0 + radius_error + 0.5 * radius_difference;
-  encoder.wheel_radius[1] *= 1.0 + radius_error - 0.5 * radius_difference;
-  encoder.track_width *= 1.0 + random_sign(rng) * kScaleError;
-  encoder.T_BO.linear() = random_rotation(rng, kMountingError) * encoder.T_BO.linear();
-
-  for (LaserBeam& beam : calibration.lasers->beams) {
-    const Eigen::Vector3d axis = beam.d_B.cross(random_direction(rng)).normalized();
-    beam.d_B = Eigen::AngleAxisd(kMountingError, axis) * beam.d_B;
-  }
-
-  // The pair turns as one about the left camera.
-  const Eigen::Vector3d pivot_B = calibration.cameras.front().T_BC.translation();
-  const Eigen::Matrix3d R_error = random_rotation(rng, kMountingError);
-  for (CameraCalibration& camera : calibration.cameras) {
-    const Eigen::Vector3d p_B = camera.T_BC.translation();
-    camera.T_BC.linear() = R_error * camera.T_BC.linear();
-    camera.T_BC.translation() = pivot_B + R_error * (p_B - pivot_B);
-  }
-  Eigen::Isometry3d& T_BC1 = calibration.cameras.back().T_BC;
-  T_BC1.linear() = T_BC1.linear() * random_rotation(rng, kStereoError);
-
-  calibration.camera_time_offset += random_sign(rng) * kTimeError;
   return calibration;
 }
 
