@@ -60,6 +60,7 @@ std::vector<Run> all_runs() {
     }
   }
   for (const std::string sequence : {"flat1", "fly1"}) runs.push_back({sequence, "", true, 1.0});
+  for (const std::string sequence : {"flat1", "fly1"}) runs.push_back({sequence, "imu_spikes:3@5+10", true});
   return runs;
 }
 

@@ -88,6 +88,12 @@ TEST_CASE("faults: text and back; what is left out is as usual") {
   CHECK(biased.parameter == -0.1);
   CHECK(to_string(biased) == "laser_biased.rear@20.5+2=-0.1");
 
+  CHECK(biased.length == 0);
+  CHECK(to_string(parse_fault("imu_spikes@20")) == "imu_spikes.both@20+5=60");
+  CHECK(to_string(parse_fault("imu_spikes:3@20")) == "imu_spikes.both:3@20+5=40");
+  CHECK(to_string(parse_fault("imu_spikes.gyro:5@20+60=12")) == "imu_spikes.gyro:5@20+60=12");
+  CHECK(parse_fault(to_string(parse_fault("imu_spikes.accel:2@20"))).length == 2);
+  CHECK(fault_help().find("imu_spikes:LENGTH") != std::string::npos);
   CHECK(to_string(parse_fault("encoder_frozen@20")) == "encoder_frozen.both@20+5");
   CHECK(to_string(parse_fault("wheel_lifted@3")) == "wheel_lifted.left@3+5");
   CHECK(parse_fault("imu_gap@7").duration == doctest::Approx(0.3));
@@ -121,6 +127,14 @@ TEST_CASE("faults: what cannot be is refused, with the reason") {
   refused("encoder_frozen.front@20+5", "both, left, right");
   refused("imu_gap.gyro@20", "imu_gap has no targets");
   refused("encoder_frozen@20+5=1", "encoder_frozen has no parameter");
+  refused("imu_saturated:2@20", "imu_saturated has no length");
+  refused("imu_spikes:0@20", "length '0'");
+  refused("imu_spikes:6@20", "length must be within 1 to 5");
+  refused("imu_spikes:1.5@20", "length '1.5'");
+  refused("imu_spikes:@20", "length ''");
+  refused("imu_spikes:nan@20", "length 'nan'");
+  refused("imu_spikes:3.gyro@20", "length '3.gyro'");
+  refused("imu_spikes:3@20=0.5", "within 1 to 1000");
   refused("wheel_slipping@20+5=-2", "within -1 to 5");
   refused("wheel_slipping@20+5=nan", "within -1 to 5");
 
@@ -284,6 +298,74 @@ TEST_CASE("faults: spikes of the IMU are rare, large, and begin at once") {
       CHECK(accel < 50.1);
       CHECK(gyro < 5.01);
     }
+  }
+}
+
+TEST_CASE("faults: spikes of a length are 20 a minute, the same over their samples, and as large as said") {
+  Options options = short_run("static", 55.0);
+  constexpr double kFrom = 2.0;
+  constexpr double kTo = 52.0;
+  constexpr int kSeeds = 8;
+  for (const int length : {1, 3, 5}) {
+    CAPTURE(length);
+    int samples = 0;
+    std::vector<double> gyro, accel;  // of each axis of each spike
+    for (int seed = 0; seed < kSeeds; ++seed) {
+      options.seed = 51 + static_cast<std::uint64_t>(seed);
+      const Simulation clean(options);
+      const Simulation faulty = with_faults(options, {"imu_spikes:" + std::to_string(length) + "@2+50"});
+      check_others_alike(clean, faulty, "imu");
+      const Changes change = changes(clean.imu(), faulty.imu(), kFrom, kTo);
+      CHECK(change.outside == 0);
+      CHECK(change.inside % length == 0);
+      samples += change.inside;
+      Eigen::Vector3d last = Eigen::Vector3d::Zero();
+      bool first = true;
+      for (std::size_t i = 0; i < clean.imu().size(); ++i) {
+        const Eigen::Vector3d a = faulty.imu()[i].accel_B - clean.imu()[i].accel_B;
+        const Eigen::Vector3d w = faulty.imu()[i].gyro_B - clean.imu()[i].gyro_B;
+        if (first && motion_time(clean.imu()[i].t_ns) >= kFrom) {
+          CHECK(a.norm() > 0.0);
+          first = false;
+        }
+        CHECK((a.norm() > 0.0) == (w.norm() > 0.0));
+        if (a.norm() > 0.0 && (a - last).norm() > 1e-9) {
+          accel.insert(accel.end(), a.data(), a.data() + 3);
+          gyro.insert(gyro.end(), w.data(), w.data() + 3);
+        }
+        last = a;
+      }
+    }
+    const auto spikes = static_cast<int>(accel.size()) / 3;
+    CHECK(samples == length * spikes);
+    // One at once in each run, and 16.7 by chance: 141 in all, with a standard deviation of 12.
+    CHECK(spikes > 141 - 4 * 12);
+    CHECK(spikes < 141 + 4 * 12);
+    const auto sigma = [](const std::vector<double>& values) {
+      double sum = 0.0;
+      for (const double value : values) sum += value * value;
+      return std::sqrt(sum / static_cast<double>(values.size()));
+    };
+    // Of some 400 draws: 3.5 % is one standard deviation.
+    CHECK(std::abs(sigma(accel) / 40.0 - 1.0) < 0.15);
+    CHECK(std::abs(sigma(gyro) / 3.0 - 1.0) < 0.15);
+  }
+}
+
+TEST_CASE("faults: spikes of a length hit what they should, by the size given, and end with the fault") {
+  const Options options = short_run("flat1", 6.0);
+  const Simulation clean(options);
+  const Simulation gyro = with_faults(options, {"imu_spikes.gyro:4@2+2"});
+  const Simulation accel = with_faults(options, {"imu_spikes.accel:4@2+2"});
+  const Simulation half = with_faults(options, {"imu_spikes.accel:4@2+2=20"});
+  const Simulation shorter = with_faults(options, {"imu_spikes:4@2+0.015"});
+  CHECK(changes(clean.imu(), gyro.imu(), 2.0, 4.0).inside >= 4);
+  CHECK(changes(clean.imu(), shorter.imu(), 2.0, 4.0).inside == 0);  // three samples: none fits
+  for (std::size_t i = 0; i < clean.imu().size(); ++i) {
+    CHECK(gyro.imu()[i].accel_B == clean.imu()[i].accel_B);
+    CHECK(accel.imu()[i].gyro_B == clean.imu()[i].gyro_B);
+    const Eigen::Vector3d whole = accel.imu()[i].accel_B - clean.imu()[i].accel_B;
+    CHECK((half.imu()[i].accel_B - clean.imu()[i].accel_B - 0.5 * whole).norm() < 1e-9);
   }
 }
 

@@ -151,14 +151,15 @@ TEST_CASE("recording: faults are listed, and the reader survives a clock that ju
   options.duration = 4.0;
   write_recording(Simulation(options), folder / "clean");
   options.faults = {parse_fault("laser_biased.rear@1.5+2=0.1"), parse_fault("clock_jump.imu@2+1"),
-                    parse_fault("imu_gap@3.5+0.2")};
+                    parse_fault("imu_gap@3.5+0.2"), parse_fault("imu_spikes.gyro:3@3+0.4")};
   const Simulation simulation(options);
   write_recording(simulation, folder / "r");
   CHECK(lines_of(folder / "clean/mav0/faults.csv").size() == 1);
   const std::vector<std::string> lines = lines_of(folder / "r/mav0/faults.csv");
-  REQUIRE(lines.size() == 4);
+  REQUIRE(lines.size() == 5);
   CHECK(lines[1] == "laser_biased,rear,1600000001500000000,1600000003500000000,0.1");
   CHECK(lines[3] == "imu_gap,,1600000003500000000,1600000003700000000,0");
+  CHECK(lines[4] == "imu_spikes:3,gyro,1600000003000000000,1600000003400000000,40");
   const std::string truth = "mav0/state_groundtruth_estimate0/data.csv";
   CHECK(bytes_of(folder / "r" / truth) == bytes_of(folder / "clean" / truth));
 

@@ -1,7 +1,7 @@
 // The simulated sensors against hand-made cases, truth and their own claims.
 #include <doctest/doctest.h>
 
-#include <Eigen/Geometry>
+#include <Eigen/Core>
 #include <array>
 #include <cmath>
 #include <cstring>

@@ -53,6 +53,20 @@ FaultType find_type(const std::string& text, const std::string& name) {
   refuse(text, "there is no '" + name + "'; there are " + list_of(names));
 }
 
+// A length that is no whole number is none that require_valid() takes.
+int parse_length(const std::string& text, const std::string& word) {
+  const double length = parse_number(text, word, "length");
+  if (!(length >= 1.0 && length <= 1000.0 && length == std::floor(length))) {
+    refuse(text, "length '" + word + "' is no number of samples");
+  }
+  return static_cast<int>(length);
+}
+
+// What the parameter of a fault is, if it has one.
+std::optional<FaultType::Parameter> parameter_of(const FaultType& type, int length) {
+  return length > 0 && type.length ? type.length->parameter : type.parameter;
+}
+
 std::size_t find_target(const std::string& text, const FaultType& type, const std::string& name) {
   for (std::size_t i = 0; i < type.targets.size(); ++i) {
     if (type.targets[i] == name) return i;
@@ -118,7 +132,11 @@ std::vector<FaultType> fault_types() {
        5.0,
        Parameter{"times gravity, the peak of each touchdown meanwhile", 5.0, 4.0, 12.0}},
       {Kind::imu_spikes, "imu_spikes", "five samples per second are off, the first at once", imu, 0, 5.0,
-       Parameter{"[m/s^2] of the accelerometer; a tenth of it [rad/s] of the gyroscope", 60.0, 1.0, 1000.0}},
+       Parameter{"[m/s^2] of the accelerometer; a tenth of it [rad/s] of the gyroscope", 60.0, 1.0, 1000.0},
+       FaultType::Length{"20 a minute, each of so many samples (1 to 5) that are off by the same", 5,
+                         Parameter{"[m/s^2] one sigma of the accelerometer, per axis; 0.075 of it [rad/s] of the "
+                                   "gyroscope",
+                                   40.0, 1.0, 1000.0}}},
       {Kind::imu_saturated, "imu_saturated", "four jolts per second; all is clipped at 4 g and 500 deg/s", imu, 0, 5.0,
        Parameter{"times these limits is the size of a jolt", 2.0, 0.0, 20.0}},
       {Kind::imu_bias_jump, "imu_bias_jump", "the biases are different ones", imu, 0, 5.0,
@@ -141,19 +159,21 @@ Fault parse_fault(const std::string& text) {
   const auto parameter = cut(rest, '=');
   const auto duration = cut(rest, '+');
   const auto start = cut(rest, '@');
+  const auto length = cut(rest, ':');
   const auto target = cut(rest, '.');
   const FaultType type = find_type(text, rest);
-  if (!start) refuse(text, "when? NAME[.TARGET]@START[+DURATION][=PARAMETER], times in seconds");
+  if (!start) refuse(text, "when? NAME[.TARGET][:LENGTH]@START[+DURATION][=PARAMETER], times in seconds");
 
   Fault fault;
   fault.kind = type.kind;
   fault.target = target ? find_target(text, type, *target) : type.usual_target;
   fault.start = parse_number(text, *start, "start");
   fault.duration = duration ? parse_number(text, *duration, "duration") : type.usual_duration;
-  if (parameter && !type.parameter) refuse(text, std::string(type.name) + " has no parameter");
-  if (type.parameter) {
-    fault.parameter = parameter ? parse_number(text, *parameter, "parameter") : type.parameter->usual;
-  }
+  if (length && !type.length) refuse(text, std::string(type.name) + " has no length");
+  if (length) fault.length = parse_length(text, *length);
+  const std::optional<FaultType::Parameter> meant = parameter_of(type, fault.length);
+  if (parameter && !meant) refuse(text, std::string(type.name) + " has no parameter");
+  if (meant) fault.parameter = parameter ? parse_number(text, *parameter, "parameter") : meant->usual;
   try {
     require_valid(fault);
   } catch (const std::invalid_argument& error) {
@@ -170,16 +190,19 @@ void require_valid(const Fault& fault) {
   require(std::isfinite(fault.start) && fault.start >= 0.0, "the start must not be negative");
   require(std::isfinite(fault.duration) && fault.duration > 0.0, "the duration must be positive");
   require(fault.target < type.targets.size() || fault.target == 0, "there is no such target");
-  if (!type.parameter) return;
-  require(fault.parameter >= type.parameter->lowest && fault.parameter <= type.parameter->highest,
-          "the parameter must be within " + number_text(type.parameter->lowest) + " to " +
-              number_text(type.parameter->highest));
+  const int longest = type.length ? type.length->highest : 0;
+  require(fault.length >= 0 && fault.length <= longest, "the length must be within 1 to " + std::to_string(longest));
+  const std::optional<FaultType::Parameter> parameter = parameter_of(type, fault.length);
+  if (!parameter) return;
+  require(fault.parameter >= parameter->lowest && fault.parameter <= parameter->highest,
+          "the parameter must be within " + number_text(parameter->lowest) + " to " + number_text(parameter->highest));
 }
 
 std::string to_string(const Fault& fault) {
   const FaultType type = type_of(fault.kind);
   std::string text = type.name;
   if (!type.targets.empty()) text += '.' + type.targets.at(fault.target);
+  if (fault.length > 0) text += ':' + std::to_string(fault.length);
   text += '@' + number_text(fault.start) + '+' + number_text(fault.duration);
   if (type.parameter) text += '=' + number_text(fault.parameter);
   return text;
@@ -187,7 +210,8 @@ std::string to_string(const Fault& fault) {
 
 std::string fault_help() {
   std::string help =
-      "Faults: NAME[.TARGET]@START[+DURATION][=PARAMETER], times in seconds; START is a stamp less 1600000000 s.\n"
+      "Faults: NAME[.TARGET][:LENGTH]@START[+DURATION][=PARAMETER], times in seconds; START is a stamp less 1600000000 "
+      "s.\n"
       "What is left out is as said below; the target is the marked one, the duration 5 s.";
   for (const FaultType& type : fault_types()) {
     help += "\n  " + std::string(type.name);
@@ -197,6 +221,11 @@ std::string fault_help() {
     help += ": " + std::string(type.summary);
     if (type.usual_duration != Fault{}.duration) help += "; +" + number_text(type.usual_duration);
     if (type.parameter) help += "; =" + number_text(type.parameter->usual) + ' ' + type.parameter->meaning;
+    if (type.length) {
+      const FaultType::Parameter& parameter = type.length->parameter;
+      help += "\n  " + std::string(type.name) + ":LENGTH: " + type.length->summary;
+      help += "; =" + number_text(parameter.usual) + ' ' + parameter.meaning;
+    }
   }
   return help;
 }

@@ -42,6 +42,7 @@ struct Fault {
   double start = 0.0;      ///< [s]
   double duration = 5.0;   ///< [s]
   double parameter = 0.0;  ///< how much; its meaning and unit: FaultType::parameter
+  int length = 0;          ///< of each spike [samples]; 0 if none is given: FaultType::length
 
   [[nodiscard]] double end() const { return start + duration; }
   // Stamps are whole nanoseconds: half of one decides on which side of a limit they are.
@@ -58,6 +59,12 @@ struct FaultType {
     const char* meaning;  ///< with its unit
     double usual, lowest, highest;
   };
+  /// Kinds that are another fault when a length is given.
+  struct Length {
+    const char* summary;
+    int highest;          ///< [samples], the lowest is 1
+    Parameter parameter;  ///< in place of the usual one
+  };
   FaultKind kind;
   const char* name;
   const char* summary;
@@ -65,14 +72,15 @@ struct FaultType {
   std::size_t usual_target = 0;
   double usual_duration = 5.0;  ///< [s]
   std::optional<Parameter> parameter = std::nullopt;
+  std::optional<Length> length = std::nullopt;
 };
 
 /// All kinds, as they are listed for people.
 [[nodiscard]] std::vector<FaultType> fault_types();
 [[nodiscard]] FaultType type_of(FaultKind kind);
 
-/// Reads NAME[.TARGET]@START[+DURATION][=PARAMETER], such as `laser_biased.rear@20+5=0.1`; what is left out is as
-/// usual. Throws std::invalid_argument, with the text and what is wrong with it.
+/// Reads NAME[.TARGET][:LENGTH]@START[+DURATION][=PARAMETER], such as `laser_biased.rear@20+5=0.1`; what is left out is
+/// as usual. Throws std::invalid_argument, with the text and what is wrong with it.
 [[nodiscard]] Fault parse_fault(const std::string& text);
 
 /// The same, with nothing left out.

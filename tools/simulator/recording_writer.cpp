@@ -201,7 +201,8 @@ void write_faults(const Simulation& simulation, const fs::path& mav0) {
   for (const Fault& fault : simulation.options().faults) {
     const FaultType type = type_of(fault.kind);
     const auto time = [](double seconds) { return number(kStart + std::llround(1e9 * seconds)); };
-    csv.print("%s,%s,%lld,%lld,%g\n", type.name, type.targets.empty() ? "" : type.targets[fault.target].c_str(),
+    const std::string name = type.name + (fault.length > 0 ? ':' + std::to_string(fault.length) : "");
+    csv.print("%s,%s,%lld,%lld,%g\n", name.c_str(), type.targets.empty() ? "" : type.targets[fault.target].c_str(),
               time(fault.start), time(fault.end()), fault.parameter);
   }
   csv.close();

@@ -12,6 +12,8 @@ namespace {
 constexpr double kAccelRange = 4.0 * kGravity;  // [m/s^2]
 constexpr double kGyroRange = 500.0 * kDegree;  // [rad/s]
 constexpr double kSpikesPerSecond = 5.0;
+constexpr double kLongSpikesPerSecond = 20.0 / 60.0;
+constexpr double kLongSpikeGyro = 0.075;  // [rad/s] per m/s^2 of the accelerometer: 3 rad/s and 40 m/s^2
 constexpr double kJoltsPerSecond = 4.0;
 // A jolt in three samples: it leaves no velocity behind, but clipping takes more from its peak than from its tail.
 constexpr std::array<double, 3> kJolt{1.0, -0.5, -0.5};
@@ -52,6 +54,25 @@ void add_spikes(std::vector<ImuSample>& samples, const Fault& fault, Rng& rng) {
     const Eigen::Vector3d gyro = uniform(rng, 0.5, 1.0) * fault.parameter / kAccelPerGyro * random_direction(rng);
     if (fault.hits(kGyro)) samples[i].gyro_B += gyro;
     if (fault.hits(kAccel)) samples[i].accel_B += accel;
+  }
+}
+
+// A connector that is loose for some milliseconds: what the sensor measures is shifted by the same in all samples of
+// that time, and its noise goes on. (A bus that garbles each transfer for itself makes the single samples above.)
+void add_long_spikes(std::vector<ImuSample>& samples, const Fault& fault, Rng& rng) {
+  const Span span = span_of(samples, fault);
+  const double chance = kLongSpikesPerSecond * sample_period(samples);
+  const auto length = static_cast<std::size_t>(fault.length);
+  for (std::size_t i = span.first; i + length <= span.last; ++i) {
+    const bool spike = uniform(rng, 0.0, 1.0) < chance || i == span.first;
+    if (!spike) continue;
+    const Eigen::Vector3d accel = normal3(rng, fault.parameter);
+    const Eigen::Vector3d gyro = normal3(rng, kLongSpikeGyro * fault.parameter);
+    for (std::size_t k = i; k < i + length; ++k) {
+      if (fault.hits(kGyro)) samples[k].gyro_B += gyro;
+      if (fault.hits(kAccel)) samples[k].accel_B += accel;
+    }
+    i += length - 1;
   }
 }
 
@@ -134,7 +155,11 @@ void fault_imu(std::vector<ImuSample>& samples, std::vector<ImuBias>& biases, co
   });
   each(faults, FaultKind::imu_spikes, [&](const Fault& fault) {
     Rng rng = fault_rng(fault, seed);
-    add_spikes(samples, fault, rng);
+    if (fault.length > 0) {
+      add_long_spikes(samples, fault, rng);
+    } else {
+      add_spikes(samples, fault, rng);
+    }
   });
   each(faults, FaultKind::imu_saturated, [&](const Fault& fault) {
     Rng rng = fault_rng(fault, seed);

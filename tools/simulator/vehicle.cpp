@@ -1,7 +1,6 @@
 #include "tools/simulator/vehicle.h"
 
 #include <Eigen/Geometry>
-#include <cmath>
 
 #include "tools/simulator/constants.h"
 
