@@ -1,4 +1,5 @@
-// ear evaluate ESTIMATE... TRUTH [--align se3|yaw|none] [--json] [--report FILE]: how good trajectories are.
+// ear evaluate ESTIMATE... TRUTH [--align se3|yaw|none] [--truth-error M] [--json] [--report FILE]: how good
+// trajectories are.
 #include <filesystem>
 #include <fstream>
 #include <iostream>
@@ -23,6 +24,7 @@ namespace fs = std::filesystem;
 struct EvaluateArguments {
   std::vector<fs::path> paths;  ///< estimates, then the truth
   evaluation::AlignmentKind kind = evaluation::AlignmentKind::yaw;
+  double truth_error = evaluation::Truth{}.error;  ///< [m]
   bool json = false;
   fs::path report;
 };
@@ -38,7 +40,8 @@ void evaluate(const EvaluateArguments& arguments) {
   const fs::path truth_path = arguments.paths.back();
   const std::vector<fs::path> estimate_paths(arguments.paths.begin(), arguments.paths.end() - 1);
   const std::vector<std::string> names = evaluation::distinct_names(estimate_paths);
-  const evaluation::Trajectory truth = evaluation::read_truth(truth_path);
+  evaluation::Truth truth = evaluation::read_truth_or_positions(truth_path);
+  truth.error = arguments.truth_error;
 
   const std::vector<evaluation::TerrainTruth> terrain = evaluation::read_terrain(truth_path);
 
@@ -51,7 +54,7 @@ void evaluate(const EvaluateArguments& arguments) {
     entries.push_back({std::move(estimate), evaluations.back()});
   }
   if (!arguments.report.empty())
-    write_report(arguments.report, evaluation::distinct_names({truth_path}).front(), truth, entries);
+    write_report(arguments.report, evaluation::distinct_names({truth_path}).front(), truth.poses, entries);
   std::cout << (arguments.json ? evaluation::to_json(evaluations, truth_path.string())
                                : evaluation::to_table(evaluations));
 }
@@ -68,7 +71,7 @@ void add_evaluate_command(CLI::App& app) {
   command
       ->add_option("ESTIMATE... TRUTH", arguments->paths,
                    "output folders of ear run, states.csv, TUM or EuRoC csv files; then the truth: a recording, or a "
-                   "TUM or EuRoC csv file")
+                   "TUM or EuRoC csv file, or a csv of positions")
       ->required()
       ->expected(-2)  // two or more
       ->option_text(" ");
@@ -76,6 +79,12 @@ void add_evaluate_command(CLI::App& app) {
       ->transform(CLI::CheckedTransformer(kinds, CLI::ignore_case).description(""))
       ->type_name("se3|yaw|none")
       ->default_str("yaw");
+  command
+      ->add_option("--truth-error", arguments->truth_error,
+                   "what the truth's positions may be off by [m]: smaller errors are no false tracking, smaller steps "
+                   "no length")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
   command->add_flag("--json", arguments->json, "the figures as JSON instead of a table");
   command->add_option("--report", arguments->report, "also write a page with plots")->type_name("FILE.html");
   command->callback([arguments] { evaluate(*arguments); });

@@ -179,6 +179,31 @@ def on_the_ground(estimate, index, times, extra, z_error):
             "mode_agreement": float(np.mean(own == ground)), **slope}
 
 
+def false_tracking(times, segments, health, travelled, p_true, R_true, p_est, R_est, P, known):
+    """Stretches far off, from the start's alignment. P: covariances of the position, or nothing."""
+    start = [i for i, time in enumerate(times) if time - times[0] <= 2_000_000_000]
+    A = attitude_rotation("yaw", R_true[start], R_est[start])
+    turns = [A.T @ a @ b.T for a, b in zip(R_true[start], R_est[start])]
+    yaws = [np.arctan2(M[1, 0] - M[0, 1], M[0, 0] + M[1, 1]) for M in turns]
+    e = (p_true - p_true[start].mean(0)) @ A + p_est[start].mean(0) - p_est
+    beyond = np.linalg.norm(e, axis=1) > np.maximum(0.1, 0.05 * (travelled - travelled[0]))
+    if P is not None:
+        arm = rms(yaws) * np.cross([0, 0, 1], p_est - p_est[0])
+        S = P + 0.02 ** 2 * np.eye(3) + arm[:, :, None] * arm[:, None, :]
+        beyond |= np.einsum("ki,kij,kj->k", e, np.linalg.inv(S), e) > 25
+    stretches, first = [], 0
+    for i in range(1, len(times) + 1):
+        if i < len(times) and beyond[i] and beyond[i - 1] and segments[i] == segments[i - 1]:
+            continue
+        if beyond[first] and times[i - 1] - times[first] >= 1_000_000_000:
+            said = sum(times[k + 1] - times[k] for k in range(first, i - 1) if health[k].startswith("tracking"))
+            stretches.append({"from_ns": times[first], "to_ns": times[i - 1], "tracking_s": 1e-9 * said,
+                              "largest_error_m": float(np.max(np.linalg.norm(e[first:i], axis=1)))})
+        first = i
+    return {"percent": 100 * sum(s["tracking_s"] for s in stretches) / known,
+            "far_off_percent": 100e-9 * sum(s["to_ns"] - s["from_ns"] for s in stretches) / known, "stretches": stretches}
+
+
 def evaluate(estimate, truth, extra, kind):
     t_est, t = [int(x) for x in estimate["t_ns"]], [int(x) for x in truth["timestamp [ns]"]]
     p_all, R_all = numbers(truth, ["p_x", "p_y", "p_z"]), matrix(numbers(truth, ["q_w", "q_x", "q_y", "q_z"]))
@@ -203,12 +228,13 @@ def evaluate(estimate, truth, extra, kind):
     e_r = [log(S.T @ x @ y.T) for x, y in zip(R_true, R_own)]
     gap_est, gap_true = np.linalg.norm(p_est[-1] - p_est[0]), np.linalg.norm(p_true[-1] - p_true[0])
 
-    nees = None
+    nees = P_position = None
     if has_covariance:
         P = np.zeros((len(t_est), 6, 6))
         for i in range(6):
             for j in range(i, 6):
                 P[:, i, j] = P[:, j, i] = numbers(estimate, [f"cov_{ERRORS[i]}_{ERRORS[j]}"])[:, 0]
+        P_position = P[index][:, :3, :3]
         P = P[index][1:]
         nees = {"frames": len(P), "skipped": 0,
                 "position": consistency([e @ np.linalg.inv(C[:3, :3]) @ e for e, C in zip(e_p[1:], P)]),
@@ -224,7 +250,10 @@ def evaluate(estimate, truth, extra, kind):
             "rotation_rmse_deg": np.degrees(rms(angles)), "rpe": [r for r in rpe if r],
             "start_to_end": {"error_m": float(np.linalg.norm(e_p[-1])), "estimated_m": float(gap_est),
                              "truth_m": float(gap_true), "difference_m": float(abs(gap_est - gap_true))},
-            "nees": nees, "ground": on_the_ground(estimate, index, times, extra, error[:, 2])}
+            "nees": nees,
+            "false_tracking": false_tracking(times, [m[3] for m in matches], [estimate["health"][i] for i in index], s, p_true,
+                                             R_true, p_own, R_own, P_position, 1e-9 * known),
+            "ground": on_the_ground(estimate, index, times, extra, error[:, 2])}
 
 
 if __name__ == "__main__":

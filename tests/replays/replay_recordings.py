@@ -2,7 +2,7 @@
 
 replay_recordings.py EAR_PROGRAM RECORDINGS REFERENCE [--write]. RECORDINGS: folder of public recordings; those that it
 lacks are skipped, by name. A rendered recording is made here. Positions must agree within TOLERANCE; whether all bits
-of estimate.tum do is shown.
+of estimate.tum do is shown, and below how far each estimate is from the truth and whether its health says so.
 """
 
 import hashlib
@@ -11,6 +11,9 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools"))
+from real.judge import judge, table  # noqa: E402
 
 TOLERANCE = 1e-6  # [m]
 STEP = 5.0  # [s] between the positions that are written
@@ -85,7 +88,7 @@ def main():
     program, recordings, reference = (Path(argument).resolve() for argument in sys.argv[1:4])
     write = "--write" in sys.argv
     expected = {} if write else read(reference)
-    found, faults, compared = {}, 0, 0
+    found, judged, faults, compared = {}, [], 0, 0
     with tempfile.TemporaryDirectory() as folder:
         rendered = Path(folder) / "rendered"
         ear(program, "simulate", *RENDERED, "--out", rendered)
@@ -97,6 +100,7 @@ def main():
                 print(f"{clip}: skipped, no folder {recordings / clip}")
         for i, (name, recording, options) in enumerate(runs):
             found[name] = estimate(program, recording, options, Path(folder) / str(i))
+            judged.append((name, judge(program, Path(folder) / str(i), recording)))
             if not write:
                 compared += 1
                 faults += compare(name, expected[name], found[name])
@@ -105,6 +109,7 @@ def main():
         for name, rows in found.items():
             lines += [f"{name}: {rows[0]}", *rows[1:]]
         reference.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    print(table(judged))
     print(f"{compared} runs compared, {faults} moved")
     return 1 if faults else 0
 

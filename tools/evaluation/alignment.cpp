@@ -66,16 +66,28 @@ Eigen::Isometry3d with_translation(const Eigen::Matrix3d& R_TE, const Eigen::Vec
 
 }  // namespace
 
-Alignment align(AlignmentKind kind, const Trajectory& estimate, const Trajectory& truth) {
+Alignment align(AlignmentKind kind, const Trajectory& estimate, const Trajectory& truth, bool has_attitude) {
   if (kind == AlignmentKind::none) return {};
   const Positions p_E = positions(estimate);
   const Positions p_T = positions(truth);
   Alignment result;
-  result.rotation_from_attitude = std::min(spread(kind, p_E), spread(kind, p_T)) < kSmallestSpread;
+  result.rotation_from_attitude = has_attitude && std::min(spread(kind, p_E), spread(kind, p_T)) < kSmallestSpread;
   const Eigen::Matrix3d R_TE = result.rotation_from_attitude ? rotation_from_attitude(kind, estimate, truth)
                                                              : rotation_from_positions(kind, p_E, p_T);
   result.T_TE = with_translation(R_TE, p_E.rowwise().mean(), p_T.rowwise().mean());
   return result;
+}
+
+Eigen::Matrix3d yaw_from_attitudes(const Trajectory& estimate, const Trajectory& truth) {
+  return rotation_from_attitude(AlignmentKind::yaw, estimate, truth);
+}
+
+Eigen::Matrix3d yaw_from_positions(const Trajectory& estimate, const Trajectory& truth) {
+  return rotation_from_positions(AlignmentKind::yaw, positions(estimate), positions(truth));
+}
+
+Eigen::Isometry3d around_centre(const Eigen::Matrix3d& R_TE, const Trajectory& estimate, const Trajectory& truth) {
+  return with_translation(R_TE, positions(estimate).rowwise().mean(), positions(truth).rowwise().mean());
 }
 
 Eigen::Isometry3d align_pose(AlignmentKind kind, const Pose& estimate, const Pose& truth) {

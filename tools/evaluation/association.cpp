@@ -17,6 +17,14 @@ std::vector<int> gaps_before(const Trajectory& trajectory) {
   return counts;
 }
 
+TimeNs known_time_ns(const Trajectory& trajectory) {
+  const std::vector<int> gaps = gaps_before(trajectory);
+  TimeNs known = 0;
+  for (std::size_t i = 1; i < trajectory.size(); ++i)
+    if (gaps[i] == gaps[i - 1]) known += trajectory[i].t_ns - trajectory[i - 1].t_ns;
+  return known;
+}
+
 }  // namespace
 
 TimeNs gap_limit(const Trajectory& trajectory) {
@@ -59,11 +67,10 @@ Association associate(const Trajectory& estimate, const Trajectory& truth) {
   return result;
 }
 
+double known_time(const Trajectory& trajectory) { return 1e-9 * static_cast<double>(known_time_ns(trajectory)); }
+
 double coverage(const Association& association, const Trajectory& truth) {
-  const std::vector<int> truth_gaps = gaps_before(truth);
-  TimeNs known = 0;
-  for (std::size_t i = 1; i < truth.size(); ++i)
-    if (truth_gaps[i] == truth_gaps[i - 1]) known += truth[i].t_ns - truth[i - 1].t_ns;
+  const TimeNs known = known_time_ns(truth);
   TimeNs covered = 0;
   const std::vector<Match>& matches = association.matches;
   for (std::size_t i = 1; i < matches.size(); ++i)

@@ -31,6 +31,9 @@ struct Association {
 /// Truth at every estimated time that it covers; never extrapolated, never across one of its gaps.
 [[nodiscard]] Association associate(const Trajectory& estimate, const Trajectory& truth);
 
+/// Time of the trajectory without its gaps [s].
+[[nodiscard]] double known_time(const Trajectory& trajectory);
+
 /// Share of the truth's time, its gaps left out, in which the estimate runs without a gap. In [0, 1].
 [[nodiscard]] double coverage(const Association& association, const Trajectory& truth);
 

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <numeric>
 #include <stdexcept>
 
@@ -62,24 +63,27 @@ Trajectory estimates_of(const Association& association, const Estimate& estimate
   return poses;
 }
 
+Eigen::Vector3d unknown_vector() { return Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN()); }
+
 /// `T_TE` aligns all poses, `T_ET_start` moves the truth into the estimate's world by the first pose alone.
 Frame compare(const Match& match, const Pose& estimated, const Eigen::Isometry3d& T_TE,
-              const Eigen::Isometry3d& T_ET_start) {
+              const Eigen::Isometry3d& T_ET_start, bool has_attitude) {
   Frame frame;
   frame.match = match;
   frame.aligned = moved(T_TE, estimated);
   const Pose truth_E = moved(T_ET_start, match.truth);
   frame.position_error = truth_E.p_WB - estimated.p_WB;
-  frame.rotation_error = rotation_vector(truth_E.q_WB * estimated.q_WB.conjugate());
+  frame.rotation_error = has_attitude ? rotation_vector(truth_E.q_WB * estimated.q_WB.conjugate()) : unknown_vector();
   return frame;
 }
 
 /// The first frame is left out: aligned to the truth, it has no error whatever its covariance says.
-void add_nees(const std::vector<PoseCovariance>& covariance, std::vector<Frame>& frames) {
+void add_nees(const std::vector<PoseCovariance>& covariance, bool has_attitude, std::vector<Frame>& frames) {
   for (std::size_t i = 1; i < frames.size(); ++i) {
     Frame& frame = frames[i];
     const PoseCovariance& P = covariance[frame.match.index];
     frame.nees_position = normalized_square(frame.position_error, P.topLeftCorner<3, 3>());
+    if (!has_attitude) continue;
     frame.nees_orientation = normalized_square(frame.rotation_error, P.bottomRightCorner<3, 3>());
     if (frame.nees_position && frame.nees_orientation) continue;
     frame.nees_position.reset();
@@ -101,7 +105,7 @@ Nees summarize_nees(const std::vector<Frame>& frames) {
   for (const Frame& frame : frames) {
     if (!frame.nees_position) continue;
     position.push_back(*frame.nees_position);
-    orientation.push_back(*frame.nees_orientation);
+    if (frame.nees_orientation) orientation.push_back(*frame.nees_orientation);
   }
   return {position.size(), frames.size() - 1 - position.size(), consistency(position), consistency(orientation)};
 }
@@ -157,21 +161,30 @@ std::vector<TerrainComparison> compare_terrain(const std::vector<Frame>& frames,
   return result;
 }
 
-/// All frames with their errors. `result.kind` is set.
-std::vector<Frame> compare_all(const Association& association, const Estimate& estimate, const Trajectory& truth,
-                               const Eigen::Isometry3d& T_TE, AlignmentKind kind) {
+/// Moves the truth into the estimate's world by the first matched pose; a truth without attitudes has its yaw from
+/// T_TE.
+Eigen::Isometry3d first_pose_alignment(AlignmentKind kind, const Pose& estimated, const Match& first,
+                                       const Eigen::Isometry3d& T_TE, bool has_attitude) {
+  if (!has_attitude) return around_centre(T_TE.linear(), {estimated}, {first.truth}).inverse();
+  return align_pose(kind, estimated, first.truth).inverse();
+}
+
+/// All frames with their errors. `distances`: along the truth, at each match [m].
+std::vector<Frame> compare_all(const Association& association, const Estimate& estimate, const Truth& truth,
+                               const std::vector<double>& distances, const Eigen::Isometry3d& T_TE,
+                               AlignmentKind kind) {
   // An estimate with covariance is one that knows gravity: its tilt at the start is an error, not a choice of axes.
   const AlignmentKind start_kind = estimate.covariance.empty() ? kind : AlignmentKind::yaw;
   const Match& first = association.matches.front();
-  const Eigen::Isometry3d T_ET_start = align_pose(start_kind, estimate.poses[first.index], first.truth).inverse();
+  const Eigen::Isometry3d T_ET_start =
+      first_pose_alignment(start_kind, estimate.poses[first.index], first, T_TE, truth.has_attitude);
 
-  const std::vector<double> distances = distance_travelled(truth, truths_of(association));
   std::vector<Frame> frames;
   for (const Match& match : association.matches) {
-    frames.push_back(compare(match, estimate.poses[match.index], T_TE, T_ET_start));
+    frames.push_back(compare(match, estimate.poses[match.index], T_TE, T_ET_start, truth.has_attitude));
     frames.back().distance = distances[frames.size() - 1];
   }
-  if (!estimate.covariance.empty()) add_nees(estimate.covariance, frames);
+  if (!estimate.covariance.empty()) add_nees(estimate.covariance, truth.has_attitude, frames);
   return frames;
 }
 
@@ -184,19 +197,20 @@ void summarize(Evaluation& result) {
   result.length = frames.back().distance - frames.front().distance;
   result.position_rmse = root_mean(frames, [&](const Frame& frame) { return error(frame).squaredNorm(); });
   result.z_rmse = root_mean(frames, [&](const Frame& frame) { return std::pow(error(frame).z(), 2); });
+  for (const Frame& frame : frames) result.position_max = std::max(result.position_max, error(frame).norm());
+  if (result.length >= kLengthStep) result.position_ratio = result.position_rmse / result.length;
+  result.start_to_end = start_to_end(frames);
+  if (!result.truth_has_attitude) return;
   result.rotation_rmse = root_mean(frames, [](const Frame& frame) {
     return std::pow(frame.match.truth.q_WB.angularDistance(frame.aligned.q_WB), 2);
   });
-  for (const Frame& frame : frames) result.position_max = std::max(result.position_max, error(frame).norm());
-  if (result.length >= kLengthStep) result.position_ratio = result.position_rmse / result.length;
   for (const double distance : kDistances)
     if (const auto relative = relative_error(frames, distance)) result.relative.push_back(*relative);
-  result.start_to_end = start_to_end(frames);
 }
 
 }  // namespace
 
-std::vector<double> distance_travelled(const Trajectory& truth, const Trajectory& at) {
+std::vector<double> distance_travelled(const Trajectory& truth, const Trajectory& at, double shortest) {
   std::vector<double> distances;
   distances.reserve(at.size());
   Eigen::Vector3d last_step = truth.front().p_WB;
@@ -206,7 +220,7 @@ std::vector<double> distance_travelled(const Trajectory& truth, const Trajectory
   for (const Pose& pose : at) {
     for (; next < truth.size() && truth[next].t_ns <= pose.t_ns; ++next) {
       const double step = (truth[next].p_WB - last_step).norm();
-      if (step < kLengthStep) continue;
+      if (step < shortest) continue;
       steps += step;
       last_step = truth[next].p_WB;
     }
@@ -218,22 +232,31 @@ std::vector<double> distance_travelled(const Trajectory& truth, const Trajectory
 
 Evaluation evaluate(const Estimate& estimate, const Trajectory& truth, AlignmentKind kind,
                     const std::vector<TerrainTruth>& terrain) {
-  const Association association = associate(estimate.poses, truth);
-  require_overlap(association, estimate, truth);
-  const Alignment alignment = align(kind, estimates_of(association, estimate), truths_of(association));
+  return evaluate(estimate, Truth{truth}, kind, terrain);
+}
+
+Evaluation evaluate(const Estimate& estimate, const Truth& truth, AlignmentKind kind,
+                    const std::vector<TerrainTruth>& terrain) {
+  const Association association = associate(estimate.poses, truth.poses);
+  require_overlap(association, estimate, truth.poses);
+  const Trajectory truths = truths_of(association);
+  const Alignment alignment = align(kind, estimates_of(association, estimate), truths, truth.has_attitude);
+  const std::vector<double> distances = distance_travelled(truth.poses, truths, std::max(kLengthStep, truth.error));
 
   Evaluation result;
   result.name = estimate.name;
   result.kind = kind;
+  result.truth_has_attitude = truth.has_attitude;
   result.rotation_from_attitude = alignment.rotation_from_attitude;
   result.poses = estimate.poses.size();
   result.matched = association.matches.size();
   result.outside = association.outside;
   result.in_gaps = association.in_gaps;
-  result.coverage = coverage(association, truth);
-  result.frames = compare_all(association, estimate, truth, alignment.T_TE, kind);
+  result.coverage = coverage(association, truth.poses);
+  result.frames = compare_all(association, estimate, truth, distances, alignment.T_TE, kind);
   summarize(result);
   if (!estimate.covariance.empty()) result.nees = summarize_nees(result.frames);
+  if (!estimate.health.empty()) result.false_tracking = false_tracking(estimate, truth, association, distances);
   if (!terrain.empty()) result.terrain = terrain_figures(compare_terrain(result.frames, estimate, terrain));
   return result;
 }

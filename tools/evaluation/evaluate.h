@@ -8,6 +8,7 @@
 
 #include "tools/evaluation/alignment.h"
 #include "tools/evaluation/association.h"
+#include "tools/evaluation/false_tracking.h"
 #include "tools/evaluation/terrain.h"
 #include "tools/evaluation/trajectory.h"
 
@@ -52,13 +53,14 @@ struct Frame {
   double distance = 0.0;                                     ///< travelled since the truth's first pose [m]
   Pose aligned;                                              ///< the estimate in the truth's world
   Eigen::Vector3d position_error = Eigen::Vector3d::Zero();  ///< [m]
-  Eigen::Vector3d rotation_error = Eigen::Vector3d::Zero();  ///< e of R_true = Exp(e) R_est [rad]
+  Eigen::Vector3d rotation_error = Eigen::Vector3d::Zero();  ///< e of R_true = Exp(e) R_est [rad]; NaN: not known
   std::optional<double> nees_position, nees_orientation;     ///< where the estimate has a usable covariance
 };
 
 struct Evaluation {
   std::string name;
   AlignmentKind kind = AlignmentKind::yaw;
+  bool truth_has_attitude = true;       ///< without: no rotation error, no RPE, no NEES of the orientation
   bool rotation_from_attitude = false;  ///< see Alignment
   std::size_t poses = 0, matched = 0, outside = 0, in_gaps = 0;
   double duration = 0.0;                 ///< from the first to the last matched pose [s]
@@ -71,17 +73,24 @@ struct Evaluation {
   double rotation_rmse = 0.0;            ///< [rad]
   std::vector<RelativeError> relative;   ///< 1, 5, 10 and 20 m, as far as the length allows
   StartToEnd start_to_end;
-  std::optional<Nees> nees;               ///< where the estimate has covariances
-  std::optional<TerrainFigures> terrain;  ///< where the truth knows the ground
+  std::optional<Nees> nees;                     ///< where the estimate has covariances
+  std::optional<FalseTracking> false_tracking;  ///< where the estimate has a health
+  std::optional<TerrainFigures> terrain;        ///< where the truth knows the ground
   std::vector<Frame> frames;
 };
 
 /// Distance travelled along the truth since its first pose, at each pose of `at` (poses of the truth or between them,
-/// in time order) [m]. Counted in steps of at least 0.1 m, so that neither the truth's noise nor its rate add to it.
-[[nodiscard]] std::vector<double> distance_travelled(const Trajectory& truth, const Trajectory& at);
+/// in time order) [m]. Counted in steps of at least `shortest` [m], so that neither the truth's noise nor its rate add
+/// to it.
+[[nodiscard]] std::vector<double> distance_travelled(const Trajectory& truth, const Trajectory& at,
+                                                     double shortest = 0.1);
 
 /// Throws std::runtime_error if fewer than two estimated poses have a truth.
 /// `terrain` is what the truth knows of the ground, in time order; it may be empty.
+[[nodiscard]] Evaluation evaluate(const Estimate& estimate, const Truth& truth, AlignmentKind kind,
+                                  const std::vector<TerrainTruth>& terrain = {});
+
+/// The same with a truth whose errors are not known.
 [[nodiscard]] Evaluation evaluate(const Estimate& estimate, const Trajectory& truth, AlignmentKind kind,
                                   const std::vector<TerrainTruth>& terrain = {});
 

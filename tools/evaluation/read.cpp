@@ -61,12 +61,24 @@ Pose read_pose(const TextTable& table, const Row& row, const PoseColumns& column
   return pose;
 }
 
-Trajectory read_poses(const TextTable& table) {
-  const PoseColumns columns = pose_columns(table);
+Pose read_position(const TextTable& table, const Row& row) {
+  Pose pose;
+  pose.t_ns = table.time(row, kEurocColumns.time, "time", kEurocColumns.time_exponent);
+  for (std::size_t i = 0; i < 3; ++i)
+    pose.p_WB(static_cast<Eigen::Index>(i)) = table.number(row, kEurocColumns.p[i], kPositionNames[i]);
+  return pose;
+}
+
+bool has_positions_alone(const TextTable& table) {
+  return table.has_commas() && !table.column("t_ns") && table.columns() >= 4 && table.columns() < 8;
+}
+
+Trajectory read_poses(const TextTable& table, bool positions_alone = false) {
+  const PoseColumns columns = positions_alone ? kEurocColumns : pose_columns(table);
   Trajectory poses;
   poses.reserve(table.rows().size());
   for (const Row& row : table.rows()) {
-    const Pose pose = read_pose(table, row, columns);
+    const Pose pose = positions_alone ? read_position(table, row) : read_pose(table, row, columns);
     if (!poses.empty() && pose.t_ns <= poses.back().t_ns)
       table.fail(row, columns.time, "time", "not later than the line before");
     poses.push_back(pose);
@@ -165,6 +177,11 @@ fs::path file_in(const fs::path& path, const std::vector<fs::path>& candidates) 
   throw std::runtime_error(path.string() + ": the folder holds no " + wanted);
 }
 
+TextTable truth_table(const fs::path& path) {
+  return TextTable(
+      file_in(path, {"mav0/state_groundtruth_estimate0/data.csv", "state_groundtruth_estimate0/data.csv"}));
+}
+
 /// The last `count` folders of a path and nothing else, or all of it if it has fewer.
 std::string last_parts(const fs::path& path, std::size_t count) {
   const std::vector<fs::path> parts(path.begin(), path.end());
@@ -187,9 +204,14 @@ bool all_different(const std::vector<std::string>& names) {
 
 }  // namespace
 
-Trajectory read_truth(const fs::path& path) {
-  return read_poses(
-      TextTable(file_in(path, {"mav0/state_groundtruth_estimate0/data.csv", "state_groundtruth_estimate0/data.csv"})));
+Trajectory read_truth(const fs::path& path) { return read_poses(truth_table(path)); }
+
+Truth read_truth_or_positions(const fs::path& path) {
+  const TextTable table = truth_table(path);
+  Truth truth;
+  truth.has_attitude = !has_positions_alone(table);
+  truth.poses = read_poses(table, !truth.has_attitude);
+  return truth;
 }
 
 std::vector<TerrainTruth> read_terrain(const fs::path& recording) {

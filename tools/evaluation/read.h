@@ -12,6 +12,9 @@ namespace ear::evaluation {
 /// The truth of a recording (its folder), or a file: EuRoC csv, TUM, or a states.csv.
 [[nodiscard]] Trajectory read_truth(const std::filesystem::path& path);
 
+/// The same; also a csv of positions alone: time [ns], x, y, z [m], and up to three columns that nobody reads.
+[[nodiscard]] Truth read_truth_or_positions(const std::filesystem::path& path);
+
 /// What a simulated recording (its folder) knows of the ground: its truth_extra.csv. Empty where there is none.
 [[nodiscard]] std::vector<TerrainTruth> read_terrain(const std::filesystem::path& recording);
 

@@ -58,19 +58,34 @@ void add_relative_rows(const std::vector<Evaluation>& evaluations, std::vector<S
 void add_nees_rows(const std::vector<Evaluation>& evaluations, std::vector<SummaryRow>& rows) {
   if (std::none_of(evaluations.begin(), evaluations.end(), [](const Evaluation& e) { return e.nees.has_value(); }))
     return;
-  const auto of = [](const std::function<double(const Nees&)>& get) -> Getter {
-    return [get](const Evaluation& e) -> std::optional<double> {
-      if (!e.nees || e.nees->frames == 0) return std::nullopt;
-      return get(*e.nees);
-    };
+  using Value = std::optional<double>;
+  const auto add = [&](const std::string& label, int decimals, const std::function<Value(const Evaluation&)>& get) {
+    rows.push_back(row(evaluations, label, decimals, false, [get](const Evaluation& e) -> Value {
+      return e.nees && e.nees->frames > 0 ? get(e) : std::nullopt;
+    }));
   };
-  const auto add = [&](const std::string& label, int decimals, const std::function<double(const Nees&)>& get) {
-    rows.push_back(row(evaluations, label, decimals, false, of(get)));
+  const auto of_attitude = [](const Evaluation& e, double value) {
+    return e.truth_has_attitude ? Value(value) : std::nullopt;
   };
-  add("NEES position, mean (3)", 2, [](const Nees& n) { return n.position.mean; });
-  add("  inside 95 % band [%]", 1, [](const Nees& n) { return 100.0 * n.position.inside; });
-  add("NEES orientation, mean (3)", 2, [](const Nees& n) { return n.orientation.mean; });
-  add("  inside 95 % band [%]", 1, [](const Nees& n) { return 100.0 * n.orientation.inside; });
+  add("NEES position, mean (3)", 2, [](const Evaluation& e) { return e.nees->position.mean; });
+  add("  inside 95 % band [%]", 1, [](const Evaluation& e) { return 100.0 * e.nees->position.inside; });
+  add("NEES orientation, mean (3)", 2, [&](const Evaluation& e) { return of_attitude(e, e.nees->orientation.mean); });
+  add("  inside 95 % band [%]", 1,
+      [&](const Evaluation& e) { return of_attitude(e, 100.0 * e.nees->orientation.inside); });
+}
+
+/// What the health says where the position is far off; nothing where no estimate has a health.
+void add_health_rows(const std::vector<Evaluation>& evaluations, std::vector<SummaryRow>& rows) {
+  if (std::none_of(evaluations.begin(), evaluations.end(),
+                   [](const Evaluation& e) { return e.false_tracking.has_value(); }))
+    return;
+  const auto add = [&](const std::string& label, double FalseTracking::*share) {
+    rows.push_back(row(evaluations, label, 1, true, [share](const Evaluation& e) {
+      return e.false_tracking ? std::optional(100.0 * ((*e.false_tracking).*share)) : std::nullopt;
+    }));
+  };
+  add("position far off [% of time]", &FalseTracking::far_off);
+  add("  of that false tracking [% of time]", &FalseTracking::share);
 }
 
 void add_terrain_rows(const std::vector<Evaluation>& evaluations, std::vector<SummaryRow>& rows) {
@@ -106,10 +121,26 @@ Json to_json(const Consistency& consistency) { return {{"mean", consistency.mean
 Json nees_json(const Evaluation& evaluation) {
   if (!evaluation.nees) return nullptr;
   const Nees& nees = *evaluation.nees;
-  return {{"frames", nees.frames},
-          {"skipped", nees.skipped},
-          {"position", nees.frames > 0 ? to_json(nees.position) : Json(nullptr)},
-          {"orientation", nees.frames > 0 ? to_json(nees.orientation) : Json(nullptr)}};
+  return {
+      {"frames", nees.frames},
+      {"skipped", nees.skipped},
+      {"position", nees.frames > 0 ? to_json(nees.position) : Json(nullptr)},
+      {"orientation", nees.frames > 0 && evaluation.truth_has_attitude ? to_json(nees.orientation) : Json(nullptr)}};
+}
+
+Json false_tracking_json(const Evaluation& evaluation) {
+  if (!evaluation.false_tracking) return nullptr;
+  Json stretches = Json::array();
+  for (const FarOff& off : evaluation.false_tracking->stretches)
+    stretches.push_back({{"from_ns", off.from_ns},
+                         {"to_ns", off.to_ns},
+                         {"tracking_s", off.tracking},
+                         {"largest_error_m", off.largest_error},
+                         {"travelled_m", off.travelled},
+                         {"most_sigmas", off.most_sigmas}});
+  return {{"percent", 100.0 * evaluation.false_tracking->share},
+          {"far_off_percent", 100.0 * evaluation.false_tracking->far_off},
+          {"stretches", stretches}};
 }
 
 Json relative_json(const Evaluation& evaluation) {
@@ -152,7 +183,7 @@ Json to_json(const Evaluation& e) {
           {"ate_percent", e.position_ratio ? Json(100.0 * *e.position_ratio) : Json(nullptr)},
           {"ate_max_m", e.position_max},
           {"z_rmse_m", e.z_rmse},
-          {"rotation_rmse_deg", kDegPerRad * e.rotation_rmse},
+          {"rotation_rmse_deg", e.truth_has_attitude ? Json(kDegPerRad * e.rotation_rmse) : Json(nullptr)},
           {"rpe", relative_json(e)},
           {"start_to_end",
            {{"error_m", e.start_to_end.error},
@@ -160,6 +191,7 @@ Json to_json(const Evaluation& e) {
             {"truth_m", e.start_to_end.truth},
             {"difference_m", e.start_to_end.difference}}},
           {"nees", nees_json(e)},
+          {"false_tracking", false_tracking_json(e)},
           {"ground", terrain_json(e)}};
 }
 
@@ -191,13 +223,16 @@ std::vector<SummaryRow> summary_rows(const std::vector<Evaluation>& evaluations)
            [](const E& e) { return e.position_ratio ? std::optional(100.0 * *e.position_ratio) : std::nullopt; }),
       make("largest error [m]", 4, true, [](const E& e) { return e.position_max; }),
       make("z RMSE [m]", 4, true, [](const E& e) { return e.z_rmse; }),
-      make("rotation RMSE [deg]", 3, true, [](const E& e) { return kDegPerRad * e.rotation_rmse; }),
+      make(
+          "rotation RMSE [deg]", 3, true,
+          [](const E& e) { return e.truth_has_attitude ? std::optional(kDegPerRad * e.rotation_rmse) : std::nullopt; }),
       make("start-to-end error [m]", 4, true, [](const E& e) { return e.start_to_end.error; }),
       make("|end - start|, off by [m]", 4, true, [](const E& e) { return e.start_to_end.difference; }),
   };
   add_relative_rows(evaluations, rows);
   add_terrain_rows(evaluations, rows);
   add_nees_rows(evaluations, rows);
+  add_health_rows(evaluations, rows);
   return rows;
 }
 
@@ -216,6 +251,8 @@ std::vector<std::string> notes(const std::vector<Evaluation>& evaluations) {
       result.push_back(e.name + ": " + std::to_string(e.outside) + total + "before or after the truth are not counted");
     if (e.in_gaps > 0)
       result.push_back(e.name + ": " + std::to_string(e.in_gaps) + total + "in gaps of the truth are not counted");
+    if (!e.truth_has_attitude)
+      result.push_back(e.name + ": the truth is positions alone; the yaw between the worlds is that of all positions");
     if (e.rotation_from_attitude)
       result.push_back(e.name + ": the positions do not tell the rotation between the worlds; it comes from attitudes");
     if (e.nees && e.nees->skipped > 0)

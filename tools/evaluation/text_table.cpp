@@ -15,6 +15,7 @@ namespace {
 
 constexpr TimeNs kLargestTime = 4'500'000'000'000'000'000;  // [ns] 142 years: differences of two fit 64 bits
 constexpr std::string_view kBlanks = " \t\r";
+constexpr std::size_t kPoseColumns = 8;  // a row with fewer holds no pose
 
 std::string_view trimmed(std::string_view text) {
   const std::size_t first = text.find_first_not_of(kBlanks);
@@ -113,6 +114,10 @@ std::vector<std::string> header_among(const std::vector<std::vector<std::string>
   return header == lines.rend() ? std::vector<std::string>{} : *header;
 }
 
+bool none_as_wide(const std::vector<Row>& rows, std::size_t width) {
+  return std::none_of(rows.begin(), rows.end(), [width](const Row& row) { return row.fields.size() == width; });
+}
+
 }  // namespace
 
 TextTable::TextTable(std::filesystem::path path) : path_(std::move(path)) {
@@ -140,6 +145,8 @@ TextTable::TextTable(std::filesystem::path path) : path_(std::move(path)) {
   }
   if (rows_.empty()) throw std::runtime_error(path_.string() + ": holds no rows of numbers");
   header_ = header_among(before, columns());
+  if (!header_.empty() && columns() < kPoseColumns && rows_.size() > 1 && none_as_wide(rows_, header_.size()))
+    header_.clear();  // a sentence with commas in it, above positions
   check_widths();
 }
 

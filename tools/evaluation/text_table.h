@@ -19,7 +19,8 @@ struct Row {
 
 /// The rows of a text file: fields separated by commas where the line has one, else by blanks. Empty lines and those
 /// that start with '#' are no rows; nor is a line without any number before the first row. The header is the last of
-/// these before the first row that has as many fields as that row; the others are comments.
+/// these before the first row that has as many fields as that row; the others are comments. Above rows of fewer
+/// than eight fields, a header that no row is as wide as is a comment too.
 class TextTable {
  public:
   /// Throws if the file cannot be read, has no rows, or has a row with another number of fields than the first.

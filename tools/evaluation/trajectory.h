@@ -21,6 +21,13 @@ struct Pose {
 /// Poses with strictly increasing times.
 using Trajectory = std::vector<Pose>;
 
+/// What an estimate is compared with.
+struct Truth {
+  Trajectory poses;
+  bool has_attitude = true;  ///< false: positions alone, as by radio; the attitudes of `poses` say nothing
+  double error = 0.1;        ///< errors of the position up to this may be the truth's own, or its stamps' [m]
+};
+
 /// 6 x 6 covariance of (position, rotation): p_true - p_est [m] and e [rad] of R_true = Exp(e) R_est, both in the axes
 /// of the estimate's world.
 using PoseCovariance = Eigen::Matrix<double, 6, 6>;
