@@ -7,7 +7,7 @@ import subprocess
 TRUTH_FILES = {"lawn_wheels": "mav0/uwb0/data.csv"}
 TRUTH_ERRORS = {
     "kitti_a": 0.3,  # its stamps are known to 30 ms, at 10 m/s
-    "ucsd_20": 0.7,  # a map made by hand of lidar scans
+    "ucsd_20": 0.7,  # of lidar scans, in a plane
     "lawn_wheels": 2.0,  # radio; its height alone scatters by 0.6 m
 }
 USUAL_ERROR = 0.1  # [m] that of `ear evaluate`: motion capture and simulations are better
@@ -23,6 +23,8 @@ COLUMNS = [  # title, path in the JSON of `ear evaluate`, factor, decimals
     ("far off [%]", ["false_tracking", "far_off_percent"], 1, 1),
     ("false tracking [%]", ["false_tracking", "percent"], 1, 1),
 ]
+
+ALARMS = ("alarms per hour", ["alarms_per_hour"], 1, 0)
 
 
 def truth_of(recording):
@@ -54,9 +56,10 @@ def cell(figures, path, factor, decimals):
 
 def table(judged):
     """Markdown; one row per pair of a name and its figures."""
-    titles = ["recording", *(title for title, *_ in COLUMNS), "truth to [m]"]
+    columns = COLUMNS + [ALARMS] if any(figures and "alarms_per_hour" in figures for _, figures in judged) else COLUMNS
+    titles = ["recording", *(title for title, *_ in columns), "truth to [m]"]
     lines = ["| " + " | ".join(titles) + " |", "|---" * len(titles) + "|"]
     for name, figures in judged:
         error = f"{figures['truth_error_m']:g}" if figures else "-"
-        lines.append("| " + " | ".join([name, *(cell(figures, *column) for _, *column in COLUMNS), error]) + " |")
+        lines.append("| " + " | ".join([name, *(cell(figures, *column) for _, *column in columns), error]) + " |")
     return "\n".join(lines)

@@ -1,0 +1,70 @@
+"""The page docs/real-data.md from the results of `tools/real_data run`."""
+
+from real.catalogue import DATA_SETS, HELD
+from real.judge import table
+
+HEAD = """# Real recordings
+
+What the estimator does on recordings that nobody here made, with the settings it ships with, and whether its health says so.
+This page is written by `tools/real_data report`; do not edit it.
+
+    tools/real_data list                       # which there are, with licence and source
+    tools/real_data convert euroc MH_01_easy   # a local copy of the original to our layout
+    tools/real_data run                        # all in ../shared/data, or those named, by name or folder
+    tools/real_data report
+
+The figures are defined in [evaluation.md](evaluation.md), *far off* and *false tracking* in [its section](evaluation.md#false-tracking); positions are
+aligned over the whole path for the ATE, over the first pose for NEES, and over the first two seconds for the rest. *Alarms per hour*: how often the health
+left `tracking` for `degraded` or `lost` while the position was not far off, over the recording's length. The sensors are taken for sound, so these count as
+false alarms; where they are not, the notes say so. One alarm in 20 s makes 180 per hour. *Truth to*: smaller errors are not judged. "-": no estimate, or no
+such truth.
+"""
+
+
+def lines_of(text, width=158):
+    """Words in lines that fit."""
+    lines = [""]
+    for word in text.split():
+        if len(lines[-1]) + len(word) + 1 > width:
+            lines.append("")
+        lines[-1] += (" " if lines[-1] else "") + word
+    return lines
+
+
+def bullet(text):
+    first, *rest = lines_of(text, 156)
+    return "\n".join(["- " + first, *("  " + line for line in rest)])
+
+
+def notes(results):
+    for result in results:
+        name, figures = result["name"], result["figures"]
+        text = f"**{name}**: {HELD[name].what}. {HELD[name].note[0].upper()}{HELD[name].note[1:]}." if name in HELD else ""
+        if result["error"]:
+            text += f" No estimate: \"{result['error']}\"."
+        elif figures is None:
+            text += " There is no truth."
+        elif figures["false_tracking"]["stretches"]:
+            worst = max(figures["false_tracking"]["stretches"], key=lambda s: s["tracking_s"])
+            text += (f" Longest false tracking: {worst['tracking_s']:.1f} s, up to {worst['largest_error_m']:.2f} m off after "
+                     f"{worst['travelled_m']:.0f} m, {worst['most_sigmas']:.1f} standard deviations.")
+        if text:
+            yield bullet(text if name in HELD else f"**{name}**:{text}")
+
+
+def data_sets():
+    lines = ["| data set | what | here | licence, as far as known | source | `convert` |", "|---|---|---|---|---|---|"]
+    for d in DATA_SETS:
+        source = f"<{d.source}>" if "://" in d.source else d.source
+        lines.append(f"| {d.name} | {d.what} | {d.fit} | {d.licence} | {source} | {'yes' if d.converter else 'no'} |")
+    return "\n".join(lines)
+
+
+def page(results):
+    judged = [(r["name"], r["figures"] and {**r["figures"], "alarms_per_hour": r["alarms_per_hour"]}) for r in results]
+    return "\n".join([HEAD, table(judged), "", *notes(results), "", "## Data sets", "", data_sets(), "",
+                      *lines_of("The converters read every row and name file, line and field of what is wrong; images are linked, not "
+                                "copied. That of comma2k19 makes, of the example segment in its repository, the recording above: the same "
+                                "samples and truth, and counts that are at most one off. That of kitti_raw has calibrations as above, but "
+                                "was not run on a whole drive. What no converter could make without guessing (noise of the IMU, the odometer's "
+                                "mounting) is named in the sensor.yaml files."), ""])
