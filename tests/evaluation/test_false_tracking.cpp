@@ -39,7 +39,7 @@ Estimate with_sigma(Estimate estimate, double sigma) {
   return estimate;
 }
 
-FalseTracking judged(Estimate estimate, Truth truth = {drive()}) {
+FalseTracking judged(Estimate estimate, const Truth& truth = {drive()}) {
   estimate.poses = moved(isometry({0, 0, 2.0}, {3, 4, 5}), estimate.poses);
   return evaluate(estimate, truth, AlignmentKind::yaw).false_tracking.value();
 }
