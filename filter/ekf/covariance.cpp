@@ -61,15 +61,18 @@ void subtract_square_of_few(const Matrix& Y, Symmetric& P) {
   }
 }
 
-/// Writes the lower triangle above the diagonal, in blocks: their rows are far apart in memory.
+/// Writes the lower triangle above the diagonal, in blocks: their rows are far apart in memory. A block by way of a
+/// matrix of its own goes through registers.
 template <typename Symmetric>
 void mirror_lower(Symmetric& P) {
   constexpr int b = 4;
   const Eigen::Index n = P.rows();
   const Eigen::Index whole = n - n % b;
   for (Eigen::Index j = 0; j < whole; j += b) {
-    for (Eigen::Index i = j + b; i < whole; i += b)
-      P.template block<b, b>(j, i) = P.template block<b, b>(i, j).transpose();
+    for (Eigen::Index i = j + b; i < whole; i += b) {
+      const Eigen::Matrix<double, b, b> below = P.template block<b, b>(i, j);
+      P.template block<b, b>(j, i) = below.transpose();
+    }
     P.template block<b, b>(j, j).template triangularView<Eigen::StrictlyUpper>() =
         P.template block<b, b>(j, j).transpose();
   }

@@ -54,7 +54,7 @@ void Ekf::reset() {
 std::optional<TimeNs> Ekf::propagate(const ImuBuffer& samples, TimeNs t_ns, const Propagation& how) {
   std::optional<TimeNs> uncertain_ns;
   if (t_ns <= state_.imu.t_ns) return uncertain_ns;
-  ErrorTransition total;
+  std::optional<ErrorTransition> total;
   const double duration = seconds_between(state_.imu.t_ns, t_ns);
   samples.for_each_piece(
       state_.imu.t_ns, t_ns,
@@ -67,13 +67,19 @@ std::optional<TimeNs> Ekf::propagate(const ImuBuffer& samples, TimeNs t_ns, cons
           noise.gyro_noise *= kGapNoiseFactor;
           noise.accel_noise *= kGapNoiseFactor;
         }
-        chain(total, error_transition(state_.imu, gyro_B, accel_B, dt, noise));
+        const ErrorTransition step = error_transition(state_.imu, gyro_B, accel_B, dt, noise);
+        if (total) {
+          chain(*total, step);
+        } else {
+          total = step;
+        }
         state_.imu = integrate(state_.imu, gyro_B, accel_B, dt);
         rate_B_ = gyro_B - state_.imu.b_g;
       });
   state_.imu.t_ns = t_ns;
   const double distance = state_.imu.v_W.norm() * duration;
-  covariance_.propagate(total, tangent_basis(state_.ground.n_W), how.normal_walk * how.normal_walk * distance);
+  covariance_.propagate(total.value_or(ErrorTransition{}), tangent_basis(state_.ground.n_W),
+                        how.normal_walk * how.normal_walk * distance);
   return uncertain_ns;
 }
 
