@@ -16,6 +16,7 @@ constexpr double kMaxSeconds = 60.0;
 constexpr std::size_t kMaxFrameSlots = 64;
 constexpr int kMaxImageSize = 16384;       // [px]
 constexpr double kLargestOffset = 3600.0;  // [s] of the cameras' clock
+constexpr double kFarAhead = 1.0;          // [s] of a frame: such inertial samples do not show what it waits for
 
 void require(bool condition, const char* what) {
   if (!condition) throw std::invalid_argument(what);
@@ -105,18 +106,25 @@ StereoFrame QueuedOdometry::view_of(const Frame& frame) const {
 /// The sum as a difference, which stays in range whatever the camera's stamp is.
 TimeNs QueuedOdometry::imu_time(TimeNs camera_ns) const { return duration_ns(-camera_offset_ns_, camera_ns); }
 
+void QueuedOdometry::hand_over(const ImuSample& sample) {
+  odometry_.add_imu(sample);
+  if (!is_time(sample.t_ns)) return;
+  const Stamp stamp = imu_stamps_.judge(sample.t_ns);
+  if (stamp != Stamp::not_later && stamp != Stamp::far_ahead) newest_imu_ns_ = sample.t_ns;
+}
+
 /// Up to and with the first inertial sample that is not earlier than `until_ns`: an interval ends between two samples.
+/// All that waits where the inertial clock is far ahead: it has jumped, or the others were set back.
 void QueuedOdometry::hand_over(TimeNs until_ns) {
   constexpr TimeNs kNever = std::numeric_limits<TimeNs>::max();
   const auto time_of = [](const auto* sample) { return sample == nullptr ? kNever : sample->t_ns; };
-  while (newest_imu_ns_ < until_ns) {
+  while (newest_imu_ns_ < until_ns || seconds_between(until_ns, newest_imu_ns_) > kFarAhead) {
     const ImuSample* const imu = imu_.queue.front();
     const EncoderSample* const encoder = encoder_.queue.front();
     const Ranges* const laser = laser_.queue.front();
     const TimeNs earliest = std::min({time_of(imu), time_of(encoder), time_of(laser)});
     if (imu != nullptr && imu->t_ns == earliest) {
-      odometry_.add_imu(*imu);
-      newest_imu_ns_ = std::max(newest_imu_ns_, imu->t_ns);
+      hand_over(*imu);
       imu_.queue.pop();
     } else if (encoder != nullptr && encoder->t_ns == earliest) {
       odometry_.add_encoder(*encoder);
@@ -189,6 +197,7 @@ void QueuedOdometry::reset() {
   drop_all(encoder_);
   drop_all(laser_);
   drop_all(frames_);
+  imu_stamps_ = StampGuard{};
   newest_imu_ns_ = std::numeric_limits<TimeNs>::min();
   odometry_.reset();
   live_.set(std::nullopt, 0);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "ear/odometry.h"
+#include "filter/ingest/stamp_guard.h"
 #include "src/live_state.h"
 #include "src/log/repeat_limit.h"
 #include "src/sample_queue.h"
@@ -102,6 +103,7 @@ class QueuedOdometry {
   [[nodiscard]] StereoFrame view_of(const Frame& frame) const;
   [[nodiscard]] TimeNs imu_time(TimeNs camera_ns) const;
   void drop_old_frames();
+  void hand_over(const ImuSample& sample);
   void hand_over(TimeNs until_ns);
   void log_overflows();
   void set_live_state();
@@ -114,8 +116,9 @@ class QueuedOdometry {
   Inlet<EncoderSample> encoder_;
   Inlet<Ranges> laser_;
   Inlet<Frame> frames_;
-  LaserSample laser_sample_;  ///< reused
-  TimeNs newest_imu_ns_ = std::numeric_limits<TimeNs>::min();
+  LaserSample laser_sample_;                                   ///< reused
+  StampGuard imu_stamps_;                                      ///< as the estimator judges them
+  TimeNs newest_imu_ns_ = std::numeric_limits<TimeNs>::min();  ///< that was handed over and is no false one
   LiveState live_;
   Overflows logged_;  ///< that the log knows of
   RepeatLimit log_limit_{10.0};

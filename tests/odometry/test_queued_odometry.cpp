@@ -1,0 +1,95 @@
+// Queues whose samples have false stamps: these delay no others.
+#include <doctest/doctest.h>
+
+#include <cstdint>
+#include <optional>
+
+#include "src/queued_odometry.h"
+#include "tools/simulator/film.h"
+
+namespace ear {
+namespace {
+
+constexpr TimeNs kPeriod = 5'000'000;
+constexpr TimeNs kSecond = 1'000'000'000;
+
+/// Wheels and IMU, no camera.
+Calibration without_cameras() {
+  Calibration calibration;
+  calibration.encoder.emplace();
+  return calibration;
+}
+
+/// Standing samples at 200 Hz from `from_ns` on, with a step after every tenth.
+void stand(QueuedOdometry& odometry, TimeNs from_ns, TimeNs to_ns) {
+  ImuSample sample;
+  sample.accel_B = {0.0, 0.0, 9.81};
+  for (sample.t_ns = from_ns; sample.t_ns < to_ns; sample.t_ns += kPeriod) {
+    REQUIRE(odometry.add_imu(sample));
+    REQUIRE(odometry.add_encoder({sample.t_ns, 0, 0}));
+    if (sample.t_ns / kPeriod % 10 == 9) static_cast<void>(odometry.step(sample.t_ns));
+  }
+}
+
+TEST_CASE("queues: one inertial stamp far ahead holds nothing back") {
+  for (const TimeNs ahead : {kSecond / 2, 10 * kSecond, 3600 * kSecond}) {
+    CAPTURE(ahead);
+    QueuedOdometry odometry(Config{}, without_cameras(), QueueCapacity{});
+    stand(odometry, 0, 3 * kSecond);
+    ImuSample sample;
+    sample.accel_B = {0.0, 0.0, 9.81};
+    sample.t_ns = 3 * kSecond + ahead;
+    REQUIRE(odometry.add_imu(sample));
+    stand(odometry, 3 * kSecond, 6 * kSecond);
+    const InputCounts counts = odometry.odometry().input_counts();
+    CHECK(counts.imu.accepted == 1200);
+    CHECK(counts.imu.far_ahead == 1);
+    CHECK(counts.encoder.accepted >= 1190);
+  }
+}
+
+TEST_CASE("queues: they go on when the clock of all sensors is set back") {
+  QueuedOdometry odometry(Config{}, without_cameras(), QueueCapacity{});
+  stand(odometry, 100 * kSecond, 103 * kSecond);
+  stand(odometry, 50 * kSecond, 53 * kSecond);
+  const std::uint64_t accepted = odometry.odometry().input_counts().imu.accepted;
+  CHECK(accepted >= 600 + 380);  // all but the second that shows it
+  CHECK(accepted < 600 + 410);
+}
+
+TEST_CASE("queues: one inertial stamp far ahead costs no frame, and the state at the IMU's rate goes on") {
+  simulator::Options options;
+  options.seed = 11;
+  options.duration = 4.0;
+  options.camera_rate_hz = 6.0;
+  const simulator::Film drive(options);
+  const simulator::Simulation& simulation = drive.simulation;
+  QueuedOdometry odometry(Config{}, simulation.calibration(), QueueCapacity{});
+  int estimates = 0;
+  int live = 0;
+  bool was_false = false;
+  for (const simulator::Delivery& delivery : simulation.deliveries()) {
+    if (delivery.stream == simulator::SensorStream::imu) {
+      ImuSample sample = simulation.imu()[delivery.index];
+      if (!was_false && estimates == 8) {
+        sample.t_ns += 3600 * kSecond;
+        was_false = true;
+      }
+      REQUIRE(odometry.add_imu(sample));
+      if (was_false && odometry.live()) ++live;
+    } else if (delivery.stream == simulator::SensorStream::camera) {
+      REQUIRE(odometry.add_stereo(drive.frame(delivery.index)));
+    } else {
+      continue;
+    }
+    std::optional<Estimate> estimate;
+    if (odometry.process(estimate) == Progress::estimated) ++estimates;
+  }
+  CHECK(was_false);
+  CHECK(odometry.odometry().input_counts().camera.far_ahead == 0);
+  CHECK(estimates >= 16);
+  CHECK(live > 200);
+}
+
+}  // namespace
+}  // namespace ear
