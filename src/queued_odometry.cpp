@@ -14,9 +14,8 @@ namespace {
 constexpr double kMinCapacity = 16.0;  // elements of a queue
 constexpr double kMaxSeconds = 60.0;
 constexpr std::size_t kMaxFrameSlots = 64;
-constexpr int kMaxImageSize = 16384;       // [px]
-constexpr double kLargestOffset = 3600.0;  // [s] of the cameras' clock
-constexpr double kFarAhead = 1.0;          // [s] of a frame: such inertial samples do not show what it waits for
+constexpr int kMaxImageSize = 16384;  // [px]
+constexpr double kFarAhead = 1.0;     // [s] of a frame: such inertial samples do not show what it waits for
 
 void require(bool condition, const char* what) {
   if (!condition) throw std::invalid_argument(what);
@@ -37,7 +36,7 @@ const Calibration& checked(const Calibration& calibration, const QueueCapacity& 
           "calibration: the rate of the lasers must be positive, at most 100 kHz");
   require(!calibration.lasers || calibration.lasers->beams.size() <= QueuedOdometry::kMaxBeams,
           "calibration: at most three laser beams");
-  require(std::abs(calibration.camera_time_offset) <= kLargestOffset,
+  require(std::abs(calibration.camera_time_offset) <= kLargestTimeOffset,
           "calibration: camera_time_offset must be a number of seconds, at most an hour");
   return calibration;
 }

@@ -8,8 +8,6 @@
 
 namespace ear {
 
-inline constexpr double kLargestTimeOffset = 3600.0;  ///< [s] of the cameras' clock
-
 /// The same, if they are usable. Throw std::invalid_argument, naming the field.
 [[nodiscard]] const FilterConfig& checked(const FilterConfig& config);
 [[nodiscard]] const Calibration& checked(const Calibration& calibration);

@@ -61,6 +61,9 @@ struct LaserCalibration {
   double noise = 0.004;     ///< 1-sigma [m]
 };
 
+/// The largest camera_time_offset [s] that an estimator takes.
+inline constexpr double kLargestTimeOffset = 3600.0;
+
 struct Calibration {
   std::vector<CameraCalibration> cameras;  ///< none, one, or two (left, right)
   double camera_time_offset = 0.0;         ///< [s] add it to a camera stamp to get IMU time

@@ -176,8 +176,12 @@ std::vector<Finding> check_calibration(const Calibration& calibration) {
     check_camera(calibration.cameras[i], "cam" + std::to_string(i), findings);
   }
   if (calibration.cameras.size() == 2) check_stereo(calibration.cameras[0], calibration.cameras[1], findings);
-  if (std::abs(calibration.camera_time_offset) > kMostTimeOffset) {
-    findings.warning("cam0: timeshift_cam_imu", Findings::text(calibration.camera_time_offset) + " s");
+  const double offset = calibration.camera_time_offset;
+  if (!(std::abs(offset) <= kLargestTimeOffset)) {
+    findings.error("cam0: timeshift_cam_imu", Findings::text(offset) + " s: not a number of seconds, at most " +
+                                                  Findings::text(kLargestTimeOffset));
+  } else if (std::abs(offset) > kMostTimeOffset) {
+    findings.warning("cam0: timeshift_cam_imu", Findings::text(offset) + " s");
   }
   check_imu(calibration.imu, findings);
   if (calibration.encoder) check_encoder(*calibration.encoder, findings);

@@ -109,6 +109,19 @@ TEST_CASE("check_calibration: a camera") {
   check_one(c, Severity::error, "cam0: resolution", "not positive");
 }
 
+TEST_CASE("check_calibration: the cameras' clock") {
+  Calibration c = good();
+  c.camera_time_offset = -0.4;
+  CHECK(check_calibration(c).empty());
+  c.camera_time_offset = 0.6;
+  check_one(c, Severity::warning, "cam0: timeshift_cam_imu", "0.6 s");
+  for (const double offset : {std::nan(""), -HUGE_VAL, 3601.0, 1e12}) {
+    CAPTURE(offset);
+    c.camera_time_offset = offset;
+    check_one(c, Severity::error, "cam0: timeshift_cam_imu", "not a number of seconds, at most 3600");
+  }
+}
+
 TEST_CASE("check_sensors: a camera or wheels are needed") {
   Calibration c = good();
   CHECK_FALSE(check_sensors(c));
