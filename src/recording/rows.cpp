@@ -9,8 +9,6 @@
 namespace ear {
 namespace {
 
-constexpr TimeNs kLargestTime = 4'500'000'000'000'000'000;  // [ns] 142 years: differences of two fit 64 bits
-
 [[noreturn]] void malformed(const std::string& column, std::string_view field, const char* expected) {
   throw RowError{RowError::Kind::malformed, column, "'" + std::string(field) + "' is not " + expected};
 }
@@ -24,7 +22,7 @@ void require_columns(const CsvRow& row, std::size_t count) {
 TimeNs time(const CsvRow& row, std::size_t index, const char* column) {
   const auto t_ns = parse_integer(row.fields[index]);
   if (!t_ns) malformed(column, row.fields[index], "a whole number of nanoseconds");
-  if (*t_ns <= -kLargestTime || *t_ns >= kLargestTime) {
+  if (*t_ns <= -kLargestStamp || *t_ns >= kLargestStamp) {
     malformed(column, row.fields[index], "within 142 years of the clock's zero");
   }
   return *t_ns;

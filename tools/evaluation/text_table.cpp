@@ -13,7 +13,6 @@
 namespace ear::evaluation {
 namespace {
 
-constexpr TimeNs kLargestTime = 4'500'000'000'000'000'000;  // [ns] 142 years: differences of two fit 64 bits
 constexpr std::string_view kBlanks = " \t\r";
 constexpr std::size_t kPoseColumns = 8;  // a row with fewer holds no pose
 
@@ -88,14 +87,14 @@ Decimal take_apart(std::string_view text) {
   return all_digits ? result : Decimal{};
 }
 
-/// Digits before position `point` as an integer, rounded by the digit there. Nothing beyond kLargestTime.
+/// Digits before position `point` as an integer, rounded by the digit there. Nothing beyond kLargestStamp.
 std::optional<TimeNs> rounded(const Decimal& number, int point) {
   std::string whole = "0";
   for (int i = 0; i < point; ++i)
     whole += i < static_cast<int>(number.digits.size()) ? number.digits[static_cast<std::size_t>(i)] : '0';
   TimeNs value = 0;
   const auto [end, error] = std::from_chars(whole.data(), whole.data() + whole.size(), value);
-  if (error != std::errc{} || end != whole.data() + whole.size() || value > kLargestTime) return std::nullopt;
+  if (error != std::errc{} || end != whole.data() + whole.size() || value > kLargestStamp) return std::nullopt;
   const bool up = point >= 0 && point < static_cast<int>(number.digits.size()) &&
                   number.digits[static_cast<std::size_t>(point)] >= '5';
   return (number.negative ? -1 : 1) * (value + (up ? 1 : 0));
