@@ -125,7 +125,10 @@ TEST_CASE("live state: two threads") {
   std::thread estimator([&] {
     while (set_at < kEnd - 1) {
       const int newest = added;
-      if (newest == set_at) continue;
+      if (newest == set_at) {
+        std::this_thread::yield();
+        continue;
+      }
       live.set(truth_at(newest * kPeriod), newest * kPeriod);
       set_at = newest;
     }

@@ -69,7 +69,8 @@ class Tracks(unittest.TestCase):
         self.assertEqual({name: results(self.out)[name] for name in before}, before)
 
     def test_interrupted_goes_on(self):
-        process = subprocess.Popen(command(self.out, SMALL), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        many = [*SMALL[:-1], "50"]  # so that it is not done before it is interrupted
+        process = subprocess.Popen(command(self.out, many), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         deadline = time.monotonic() + 120
         while not results(self.out) and time.monotonic() < deadline:
             time.sleep(0.01)
