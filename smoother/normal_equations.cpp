@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace ear::smoother {
@@ -52,8 +53,8 @@ bool NormalEquations::linearize(const Factor& factor, const double* point) {
   }
   if (!factor.cost->Evaluate(factor.blocks.data(), residual_.data(), jacobians.data())) return false;
   if (factor.loss == nullptr) return true;
-  double rho[3];
-  factor.loss->Evaluate(residual_.squaredNorm(), rho);
+  std::array<double, 3> rho{};
+  factor.loss->Evaluate(residual_.squaredNorm(), rho.data());
   const double weight = std::sqrt(rho[1]);
   residual_ *= weight;
   for (std::size_t i = 0; i < term_count_; ++i) terms_[i].J *= weight;
@@ -154,6 +155,7 @@ std::unique_ptr<PriorFactor> marginalize(const std::vector<const Factor*>& facto
   J.conservativeResize(rows, n);
   r0.conservativeResize(rows);
   std::vector<int> columns;
+  columns.reserve(kept.size());
   for (const PriorBlock& block : kept) columns.push_back(equations.column(block.block) - m);
   to_invariant(J, kept, columns);
   return std::make_unique<PriorFactor>(kept, J, r0);
