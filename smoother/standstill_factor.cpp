@@ -12,26 +12,26 @@ StandstillFactor::StandstillFactor(const StandstillConfig& config) {
 bool StandstillFactor::Evaluate(double const* const* blocks, double* residual, double** jacobians) const {
   const Pose T_i = to_pose(blocks[0]);
   const Pose T_j = to_pose(blocks[1]);
-  const Eigen::Matrix3d R_iW = T_i.R.transpose();
-  const Eigen::Vector3d turn = log_so3(R_iW * T_j.R);
+  const Eigen::Matrix3d R_BiW = T_i.R.transpose();
+  const Eigen::Vector3d turn = log_so3(R_BiW * T_j.R);
   const Eigen::Vector3d moved_W = T_j.p - T_i.p;
   Eigen::Matrix<double, 9, 1> r;
-  r << turn, R_iW * moved_W, Eigen::Map<const Eigen::Vector3d>(blocks[2]);
+  r << turn, R_BiW * moved_W, Eigen::Map<const Eigen::Vector3d>(blocks[2]);
   Eigen::Map<Eigen::Matrix<double, 9, 1>>(residual, 9) = weight_.cwiseProduct(r);
   if (jacobians == nullptr) return true;
 
-  const Eigen::Matrix3d J_turn = left_jacobian_inverse(turn) * R_iW;
+  const Eigen::Matrix3d J_turn = left_jacobian_inverse(turn) * R_BiW;
   if (jacobians[0] != nullptr) {
     Eigen::Matrix<double, 9, 7> J = Eigen::Matrix<double, 9, 7>::Zero();
     J.block<3, 3>(0, 0) = -J_turn;
-    J.block<3, 3>(3, 0) = R_iW * skew(moved_W);
-    J.block<3, 3>(3, 3) = -R_iW;
+    J.block<3, 3>(3, 0) = R_BiW * skew(moved_W);
+    J.block<3, 3>(3, 3) = -R_BiW;
     store((weight_.asDiagonal() * J).eval(), jacobians[0]);
   }
   if (jacobians[1] != nullptr) {
     Eigen::Matrix<double, 9, 7> J = Eigen::Matrix<double, 9, 7>::Zero();
     J.block<3, 3>(0, 0) = J_turn;
-    J.block<3, 3>(3, 3) = R_iW;
+    J.block<3, 3>(3, 3) = R_BiW;
     store((weight_.asDiagonal() * J).eval(), jacobians[1]);
   }
   if (jacobians[2] != nullptr) {

@@ -1,6 +1,7 @@
 #include "smoother/terms.h"
 
 #include <algorithm>
+#include <array>
 #include <utility>
 
 #include "smoother/feature_factor.h"
@@ -116,8 +117,8 @@ bool Terms::fits(const PointTerm& term) const {
   for (const Factor& factor : term.factors) {
     Eigen::Vector2d r;
     if (!factor.cost->Evaluate(factor.blocks.data(), r.data(), nullptr)) return false;
-    double rho[3];
-    factor.loss->Evaluate(r.squaredNorm(), rho);
+    std::array<double, 3> rho{};
+    factor.loss->Evaluate(r.squaredNorm(), rho.data());
     sum += rho[1] * r.squaredNorm();
   }
   const int freedom = 2 * static_cast<int>(term.factors.size()) - 3;

@@ -34,13 +34,13 @@ bool WheelFactor::Evaluate(double const* const* blocks, double* residual, double
       z.J_alpha_radius * (odometer.wheel_radius.cwiseQuotient(z.wheels.radius) - Eigen::Vector2d::Ones()) +
       z.J_alpha_track_width * (odometer.track_width / z.wheels.track_width - 1.0) +
       z.J_alpha_axle * (y_B - z.wheels.y_B);
-  const Eigen::Matrix3d R_iW = T_i.R.transpose();
+  const Eigen::Matrix3d R_BiW = T_i.R.transpose();
   const Eigen::Vector3d lever_W = T_j.R * p_BO;
   const Eigen::Vector3d moved_W = lever_W + T_j.p - T_i.p;  // from the body's origin at i
-  Eigen::Map<Eigen::Vector3d>(residual, 3) = whitening_ * (alpha_Bi + p_BO - R_iW * moved_W);
+  Eigen::Map<Eigen::Vector3d>(residual, 3) = whitening_ * (alpha_Bi + p_BO - R_BiW * moved_W);
   if (jacobians == nullptr) return true;
 
-  const Eigen::Matrix3d to_i = whitening_ * R_iW;
+  const Eigen::Matrix3d to_i = whitening_ * R_BiW;
   if (jacobians[0] != nullptr) {
     Eigen::Matrix<double, 3, 7> J;
     J << -to_i * skew(moved_W), to_i, Eigen::Vector3d::Zero();

@@ -44,6 +44,7 @@ ear_result guarded(const Function& function, char* message = nullptr, std::size_
   }
 }
 
+// NOLINTBEGIN(modernize-avoid-c-arrays): they are those of the C interface
 Eigen::Vector3d vector_of(const double (&values)[3]) { return Eigen::Vector3d::Map(values); }
 
 Eigen::Isometry3d isometry_of(const double (&rows)[16]) {
@@ -57,6 +58,7 @@ Eigen::Isometry3d isometry_of(const double (&rows)[16]) {
 void write_isometry(const Eigen::Isometry3d& T, double (&rows)[16]) {
   Eigen::Map<Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>{rows} = T.matrix();
 }
+// NOLINTEND(modernize-avoid-c-arrays)
 
 /// The value of an enumeration, which in C can hold anything: it is read as the number that it is there.
 template <typename E, typename Given>

@@ -24,7 +24,7 @@ std::uint64_t thread_allocations() { return calls; }
 }  // namespace ear::tools
 
 #if EAR_COUNTS_ALLOCATIONS
-// NOLINTBEGIN(bugprone-reserved-identifier): these are glibc's names
+// NOLINTBEGIN(bugprone-reserved-identifier,readability-identifier-naming): these are glibc's names
 extern "C" {
 
 void* __libc_malloc(std::size_t size);
@@ -56,5 +56,5 @@ int posix_memalign(void** block, std::size_t alignment, std::size_t size) {
   return 0;
 }
 }
-// NOLINTEND(bugprone-reserved-identifier)
+// NOLINTEND(bugprone-reserved-identifier,readability-identifier-naming)
 #endif

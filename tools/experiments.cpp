@@ -46,7 +46,7 @@ std::vector<std::string> sequences_of(const ExperimentsArguments& args) {
   for (const std::string& name : args.only) {
     if (std::find(known.begin(), known.end(), name) != known.end()) continue;
     std::string names;
-    for (const std::string& one : known) names += (names.empty() ? "" : ", ") + one;
+    for (const std::string& one : known) names.append(names.empty() ? "" : ", ").append(one);
     throw std::invalid_argument("--only: no sequence '" + name + "'; there are " + names);
   }
   return args.only;

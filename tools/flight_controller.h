@@ -12,7 +12,7 @@
 #include "tools/real_time.h"
 #include "tools/replay.h"
 
-namespace CLI {
+namespace CLI {  // NOLINT(readability-identifier-naming): the library's name
 class App;
 }
 

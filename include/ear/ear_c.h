@@ -10,10 +10,10 @@
 #ifndef EAR_EAR_C_H
 #define EAR_EAR_C_H
 
+/* NOLINTBEGIN: this is C; the lints are those of C++ */
+
 #include <stddef.h>
 #include <stdint.h>
-
-/* NOLINTBEGIN: this is C; the lints are those of C++ */
 
 #ifdef __cplusplus
 extern "C" {

@@ -1,5 +1,6 @@
 #include "tools/experiments/in_parallel.h"
 
+#include <algorithm>
 #include <atomic>
 #include <exception>
 #include <mutex>
@@ -22,6 +23,7 @@ void in_parallel(std::size_t count, int threads, const std::function<void(std::s
     }
   };
   std::vector<std::thread> pool;
+  pool.reserve(static_cast<std::size_t>(std::max(threads, 0)));
   for (int i = 0; i < threads; ++i) pool.emplace_back(loop);
   for (std::thread& thread : pool) thread.join();
   if (failure) std::rethrow_exception(failure);

@@ -246,9 +246,9 @@ bool operator==(const Setup& a, const Setup& b) {
 }
 
 const Texts& paper_sequences() {
-  static const Texts names{"flat1", "flat2", "flat3", "wave1", "wave2", "wave3",      "slope",     "lawn",
-                           "fly1",  "fly2",  "sway1", "sway2", "sway3", "occlusion1", "occlusion2"};
-  return names;
+  static const Texts kNames{"flat1", "flat2", "flat3", "wave1", "wave2", "wave3",      "slope",     "lawn",
+                            "fly1",  "fly2",  "sway1", "sway2", "sway3", "occlusion1", "occlusion2"};
+  return kNames;
 }
 
 std::vector<TableDefinition> paper_tables(const Texts& sequences) {
@@ -268,6 +268,7 @@ std::vector<TableDefinition> ablation_tables(const Texts& sequences, bool tracks
                           {}};
   for (const double rate : kAblationRates) summary.our_columns.push_back(rate_text(rate));
   std::vector<TableDefinition> tables;
+  tables.reserve(kAblationRates.size() + 1);
   for (const double rate : kAblationRates) {
     tables.push_back({"ablation, " + rate_text(rate),
                       "The same at " + rate_text(rate) + ": RMSE of the position [m]",

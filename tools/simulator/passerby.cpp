@@ -73,8 +73,9 @@ cv::Rect bounds(const Panel& panel, const Eigen::Isometry3d& T_WC, const CameraC
   constexpr double kMargin = 30.0;  // [px] a lens bends straight lines, and the panel moves during the exposure
   double left = camera.width, right = 0.0, top = camera.height, bottom = 0.0;
   for (int i = 0; i < 4; ++i) {
-    const Eigen::Vector3d corner_W =
-        panel.corner_W + (i % 2) * panel.width * panel.u_W + (i / 2) * panel.height * panel.v_W;
+    const double u = i % 2 == 0 ? 0.0 : panel.width;
+    const double v = i < 2 ? 0.0 : panel.height;
+    const Eigen::Vector3d corner_W = panel.corner_W + u * panel.u_W + v * panel.v_W;
     const Eigen::Vector3d p_C = T_WC.inverse() * corner_W;
     if (p_C.z() < 0.2) return all;
     // Clamped: beyond the picture, but where the lens's model still holds.

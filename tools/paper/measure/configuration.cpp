@@ -103,16 +103,16 @@ bool is_built(Estimator estimator) {
 }
 
 const std::vector<Configuration>& configurations() {
-  static const std::vector<Configuration> all = all_configurations();
-  return all;
+  static const std::vector<Configuration> kAll = all_configurations();
+  return kAll;
 }
 
 const std::vector<std::string>& ablation() {
-  static const std::vector<std::string> names{
+  static const std::vector<std::string> kNames{
       "default",          "none",         "no-pitch-rate", "no-lasers",
       "beams-together",   "no-side-slip", "weights-off",   "weights-mahalanobis",
       "weights-distance", "oldest-clone", "no-prediction"};
-  return names;
+  return kNames;
 }
 
 const Configuration& find_configuration(const std::string& name) {
