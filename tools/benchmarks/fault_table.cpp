@@ -429,4 +429,4 @@ int parse_and_run(int argc, char** argv) {
 }  // namespace
 }  // namespace ear::experiments
 
-int main(int argc, char** argv) { return ear::experiments::parse_and_run(argc, argv); }
+int main(int argc, char** argv) { return ear::tools::run_main(ear::experiments::parse_and_run, argc, argv); }

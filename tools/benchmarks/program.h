@@ -2,6 +2,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <cstdio>
 #include <cstdlib>
 #include <exception>
 #include <iostream>
@@ -21,6 +22,16 @@ int run_program(CLI::App& app, int argc, char** argv, const Work& work) {
     return EXIT_FAILURE;
   }
   return EXIT_SUCCESS;
+}
+
+/// For main(), which lets no exception out: run_program() leaves only those of options that cannot be declared.
+inline int run_main(int (*parse_and_run)(int, char**), int argc, char** argv) {
+  try {
+    return parse_and_run(argc, argv);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "%s\n", error.what());
+    return EXIT_FAILURE;
+  }
 }
 
 }  // namespace ear::tools

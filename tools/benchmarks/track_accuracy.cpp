@@ -101,7 +101,8 @@ std::vector<Variant> with_estimators(const Arguments& args, const std::vector<Va
   for (Variant variant : settings) {
     const std::string name = variant.settings;
     for (const std::string& estimator : args.estimators) {
-      variant.settings = name == "default" ? estimator : estimator + " " + name;
+      variant.settings = estimator;
+      if (name != "default") variant.settings.append(" ").append(name);
       variant.estimator = {tools::estimator_named(estimator), true};
       variants.push_back(variant);
     }
@@ -210,4 +211,4 @@ int parse_and_run(int argc, char** argv) {
 }  // namespace
 }  // namespace ear::experiments
 
-int main(int argc, char** argv) { return ear::experiments::parse_and_run(argc, argv); }
+int main(int argc, char** argv) { return ear::tools::run_main(ear::experiments::parse_and_run, argc, argv); }
