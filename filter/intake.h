@@ -36,7 +36,7 @@ void take_imu(const Intake& to, double max_gap, const Restart& restart, const Go
     if (due_ns && to.ekf.running()) go_to(*due_ns);
     const ImuFault fault = to.ingest.store(*sample);
     to.health.report_imu_fault(fault.gyro, fault.accel, sample->t_ns);
-    on_contact(to.sources.watch_contact(*sample, to.ekf));
+    on_contact(to.sources.watch_contact(to.ingest.imu().newest(), to.ekf));
   }
   if (to.ingest.imu_clock().take_correction()) {
     to.health.report_imu_fault(true, true, to.ingest.imu().newest().t_ns);

@@ -45,13 +45,6 @@ ImuSample ImuBuffer::interpolate(std::size_t next, TimeNs t_ns) const {
   return result;
 }
 
-void ImuBuffer::correct_newest(const Eigen::Vector3d& gyro_B, const Eigen::Vector3d& accel_B) {
-  ImuSample& newest = samples_[slot(size_ - 1)];
-  newest.gyro_B = gyro_B;
-  newest.accel_B = accel_B;
-  noise_[slot(size_ - 1)] = ImuNoiseFactors{};
-}
-
 void ImuBuffer::raise_newest_noise(std::size_t count, const ImuNoiseFactors& noise) {
   for (std::size_t i = size_ - std::min(count, size_); i < size_; ++i) {
     ImuNoiseFactors& factors = noise_[slot(i)];

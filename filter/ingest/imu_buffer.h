@@ -40,8 +40,14 @@ class ImuBuffer {
 
   void push(const ImuSample& sample, const ImuNoiseFactors& noise = {});
   void clear() { size_ = 0; }
-  /// Puts other values in place of the newest sample, under the same stamp, with the usual noise.
-  void correct_newest(const Eigen::Vector3d& gyro_B, const Eigen::Vector3d& accel_B);
+  /// The sample that so many came after, to correct it: its stamp stays.
+  struct Entry {
+    ImuSample& sample;
+    ImuNoiseFactors& noise;
+  };
+  [[nodiscard]] Entry entry(std::size_t age) {
+    return {samples_[slot(size_ - 1 - age)], noise_[slot(size_ - 1 - age)]};
+  }
   /// The `count` newest samples have at least this noise.
   void raise_newest_noise(std::size_t count, const ImuNoiseFactors& noise);
 

@@ -1,22 +1,95 @@
 #include "filter/ingest/imu_spike.h"
 
+#include <algorithm>
+#include <cmath>
+
 namespace ear {
 namespace {
 
-constexpr double kAccelSpike = 25.0;  // [m/s^2] chosen: of one sample from the mean of its neighbours
-constexpr double kGyroSpike = 2.0;    // [rad/s] chosen: the same
-constexpr double kSpikeRatio = 4.0;   // chosen: and so many times the difference of these
-
-bool is_spike(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c, double least) {
-  const double off = (b - 0.5 * (a + c)).norm();
-  return off > least && off > kSpikeRatio * (c - a).norm();
-}
+constexpr double kTurnRate = 100.0;    // [rad/s^2] chosen: of a multirotor of 1.5 kg, 15 N on one side at 0.15 m
+constexpr double kSpread = 4.0;        // chosen: steps beyond so many standard deviations of the recent ones are jumps
+constexpr double kSpreadMemory = 0.2;  // [s] chosen
+constexpr double kReturned = 0.25;     // chosen: of the deviation, between the samples before and after a spike
+constexpr double kFlat = 0.125;  // chosen: of it, between the samples of one; half a sine over three differs by 0.4
 
 }  // namespace
 
-ImuFault find_spike(const ImuSample& before, const ImuSample& suspect, const ImuSample& after) {
-  return {is_spike(before.gyro_B, suspect.gyro_B, after.gyro_B, kGyroSpike),
-          is_spike(before.accel_B, suspect.accel_B, after.accel_B, kAccelSpike)};
+bool SpikeWatch::add(ImuBuffer& samples, double dt, bool no_strike, bool clips) {
+  const Eigen::Vector3d value = samples.entry(0).sample.*value_;
+  const Eigen::Vector3d before = samples.entry(length_ + 1).sample.*value_;
+  const double step = (value - (length_ > 0 ? measured_[length_ - 1] : before)).norm();
+  const bool may_be_strike = strikes_ && !no_strike;
+  const double spread = kSpread * std::sqrt(step_variance_);
+  const double limit = std::max(strikes_ && no_strike ? 0.0 : std::max(least_, least_rate_ * dt), spread);
+  const double counted = std::min(step, limit);
+  step_variance_ += (1.0 - std::exp(-dt / kSpreadMemory)) * (counted * counted - step_variance_);
+
+  if (length_ > 0) {
+    const double off = (measured_[length_ - 1] - before).norm();
+    if (step > limit && (value - before).norm() <= kReturned * off) {
+      replace(samples, may_be_strike && length_ == 2);
+      return true;
+    }
+    const bool strike = may_be_strike && (clips || (value - measured_[0]).norm() > kFlat * off);
+    if (length_ == kLongest || strike) give_up(samples);
+  }
+  const bool begins = step > limit && samples.entry(1).noise.*factor_ == 1.0 && !(may_be_strike && clips);
+  if (length_ == 0 && !begins) return false;
+  measured_[length_++] = value;
+  for (std::size_t i = may_be_strike && length_ == 1 ? 1 : 0; i < length_; ++i) {
+    const ImuBuffer::Entry held = samples.entry(length_ - 1 - i);
+    const double coherent = std::sqrt(2.0 * static_cast<double>(i) + 1.0);
+    held.sample.*value_ = before;
+    held.noise.*factor_ = std::max(held.noise.*factor_, coherent * (measured_[i] - before).norm() / sigma_);
+  }
+  return false;
+}
+
+/// Between the samples before and after a spike the body did what it did in the recent past: a random walk with its
+/// steps, known at both ends. What that leaves of the integral over n samples has the variance q (n + 1)^3 / 12, q of a
+/// step. To this comes what the samples of the spike do not agree about; `in_doubt` all of them: two samples of a
+/// strike may be alike by chance.
+void SpikeWatch::replace(ImuBuffer& samples, bool in_doubt) {
+  const auto n = static_cast<double>(length_);
+  const Eigen::Vector3d before = samples.entry(length_ + 1).sample.*value_;
+  const Eigen::Vector3d slope = (samples.entry(0).sample.*value_ - before) / (n + 1.0);
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero(), square = Eigen::Vector3d::Zero();
+  for (std::size_t i = 0; i < length_; ++i) {
+    Eigen::Vector3d& crossed = samples.entry(length_ - i).sample.*value_;
+    crossed = before + static_cast<double>(i + 1) * slope;
+    mean += (measured_[i] - crossed) / n;
+    square += (measured_[i] - crossed).cwiseAbs2() / n;
+  }
+  const double disagreement = square.sum() - (in_doubt ? 0.0 : mean.squaredNorm());
+  const double variance = (step_variance_ * std::pow(n + 1.0, 3) / (12.0 * n) + disagreement) / 3.0;
+  for (std::size_t i = 0; i < length_; ++i) {
+    samples.entry(length_ - i).noise.*factor_ = std::max(1.0, std::sqrt(variance) / sigma_);
+  }
+  length_ = 0;
+}
+
+void SpikeWatch::give_up(ImuBuffer& samples) {
+  for (std::size_t i = 0; i < length_; ++i) samples.entry(length_ - i).sample.*value_ = measured_[i];
+  length_ = 0;
+}
+
+void ImuSpikes::give_up(ImuBuffer& samples) {
+  gyro_.give_up(samples);
+  accel_.give_up(samples);
+}
+
+ImuSpikes::ImuSpikes(const ImpactConfig& config, const ImuCalibration& imu)
+    : gyro_(&ImuSample::gyro_B, &ImuNoiseFactors::gyro, imu.gyro_noise * std::sqrt(imu.rate_hz), 0.0, kTurnRate, false),
+      accel_(&ImuSample::accel_B, &ImuNoiseFactors::accel, imu.accel_noise * std::sqrt(imu.rate_hz),
+             config.accel_deviation, 0.0, true) {}
+
+ImuFault ImuSpikes::add(ImuBuffer& samples, double dt, bool accel_clips) {
+  const std::size_t accel_length = accel_.length();
+  const bool together = gyro_.length() == accel_length;  // so far
+  const bool gyro = gyro_.add(samples, dt, false, false);
+  const bool no_strike = together && (gyro || gyro_.length() > accel_length);
+  const bool accel = accel_.add(samples, dt, no_strike, accel_clips);
+  return {gyro, accel};
 }
 
 }  // namespace ear

@@ -1,5 +1,6 @@
 #include "filter/ingest/ingest.h"
 
+#include <cmath>
 #include <utility>
 
 namespace ear {
@@ -24,6 +25,7 @@ Ingest::Ingest(const FilterConfig& config, const Calibration& calibration)
       calibration_(calibration),
       guard_(calibration, config.max_imu_gap),
       impact_guard_(config.impact, calibration.imu),
+      spikes_(config.impact, calibration.imu),
       imu_(kImuCapacity),
       increments_(kReadingCapacity),
       ranges_(kReadingCapacity) {
@@ -49,19 +51,17 @@ ImuVerdict Ingest::judge(const ImuSample& sample) {
 }
 
 ImuFault Ingest::store(const ImuSample& sample) {
-  ImuFault spike;
-  if (imu_.size() >= 2) {
-    const ImuSample& before = imu_[imu_.size() - 2];
-    if (seconds_between(before.t_ns, sample.t_ns) <= config_.max_imu_gap)
-      spike = find_spike(before, imu_.newest(), sample);
-    if (spike.any()) {
-      imu_.correct_newest(0.5 * (before.gyro_B + sample.gyro_B), 0.5 * (before.accel_B + sample.accel_B));
-      guard_.count_spike();
-    }
-  }
+  const double dt = imu_.empty() ? INFINITY : seconds_between(imu_.newest().t_ns, sample.t_ns);
   const ImuNoiseFactors noise = impact_guard_.add(sample);
   imu_.raise_newest_noise(static_cast<std::size_t>(impact_guard_.clipped_before()), noise);
   imu_.push(sample, noise);
+  ImuFault spike;
+  if (dt <= config_.max_imu_gap) {
+    spike = spikes_.add(imu_, dt, impact_guard_.accel_clips());
+  } else {
+    spikes_.give_up(imu_);
+  }
+  if (spike.any()) guard_.count_spike();
   return {spike.gyro || impact_guard_.gyro_clips(), spike.accel || impact_guard_.accel_clips()};
 }
 

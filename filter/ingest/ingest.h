@@ -36,7 +36,7 @@ class Ingest {
   /// comes out goes to judge() and store().
   [[nodiscard]] ImuClock& imu_clock() { return imu_clock_; }
   [[nodiscard]] ImuVerdict judge(const ImuSample& sample);
-  /// Into the buffer. What only a fault of a sensor does: a spike (of the sample before), a clipped value.
+  /// Into the buffer. What only a fault of a sensor does: a spike (of the samples before), a clipped value.
   ImuFault store(const ImuSample& sample);
 
   /// A reading, by the common clock and with the wheels' increment since the one before.
@@ -88,6 +88,7 @@ class Ingest {
   StreamClock encoder_clock_, camera_clock_;
   InputGuard guard_;
   ImpactGuard impact_guard_;
+  ImuSpikes spikes_;
   ImuBuffer imu_;
   ImuInterruption interruption_;
   std::optional<EncoderReader> encoder_;

@@ -66,19 +66,6 @@ TEST_CASE("ingest: a reading that is not later than the one before, or far behin
   CHECK(counts.laser.far_ahead == 1);
 }
 
-TEST_CASE("ingest: a single sample that is off is replaced, a lasting change is not") {
-  for (const bool lasting : {false, true}) {
-    CAPTURE(lasting);
-    Ingest ingest = filled(50 * kMs);
-    ingest.store(sample(55 * kMs, 3.0));
-    const ImuFault fault = ingest.store(sample(60 * kMs, lasting ? 3.0 : 0.0));
-    CHECK(fault.gyro == !lasting);
-    CHECK_FALSE(fault.accel);
-    CHECK((ingest.imu()[11].gyro_B.z() == 0.0) == !lasting);
-    CHECK(ingest.counts().imu_spikes == (lasting ? 0 : 1));
-  }
-}
-
 TEST_CASE("ingest: a gap leaves motion unseen, once, in proportion to how far the state has come") {
   Ingest ingest = filled(50 * kMs);
   CHECK(ingest.judge(sample(250 * kMs)).unseen == doctest::Approx(0.2));

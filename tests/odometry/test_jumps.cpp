@@ -94,6 +94,20 @@ TEST_CASE("jumps: clipped jolts, four a second, with and without wheels on the g
   CHECK(run("wave1", "imu_saturated", 931).ate < 3.0 * run("wave1", "", 931).ate);
 }
 
+TEST_CASE("jumps: spikes of one to five samples cost little and are announced") {
+  for (const std::string sequence : {"flat1", "fly1"}) {
+    const double clean = run(sequence, "").ate;
+    for (const std::string fault :
+         {"imu_spikes:1@20+10", "imu_spikes:3@20+10", "imu_spikes:5@20+10", "imu_spikes.accel:3@20+10"}) {
+      CAPTURE(fault);
+      const Outcome outcome = run(sequence, fault);
+      CHECK(outcome.ate < 2.0 * clean);
+      CHECK(outcome.named);
+      CHECK(outcome.lost < 0.1);  // with a frame within a spike the velocity may be withheld for a moment
+    }
+  }
+}
+
 TEST_CASE("jumps: a beam that is wrong from the start does not tell where the ground is") {
   const double clean = run("flat1", "").ate;
   for (const std::string fault : {"laser_biased.front_left@0+5=-0.05", "laser_biased.front_left@0+5=0.3"}) {

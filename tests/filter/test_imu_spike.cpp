@@ -1,0 +1,198 @@
+// Spikes of one to five samples are found and crossed by a line; strikes, turns and vibration are not taken for them.
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <utility>
+
+#include "filter/ingest/ingest.h"
+
+using namespace ear;
+
+namespace {
+
+constexpr double kGravity = 9.81;
+
+/// A body at rest, to whose samples something is added.
+class Stream {
+ public:
+  explicit Stream(double rate_hz = 200.0) : rate_(rate_hz), ingest_(FilterConfig{}, calibration(rate_hz)) {}
+
+  double dt() const { return 1.0 / rate_; }
+  const ImuBuffer& samples() const { return ingest_.imu(); }
+  std::uint64_t spikes() const { return ingest_.counts().imu_spikes; }
+  double gyro_sigma() const { return ImuCalibration{}.gyro_noise * std::sqrt(rate_); }
+
+  ImuFault add(const Eigen::Vector3d& rate_B = Eigen::Vector3d::Zero(),
+               const Eigen::Vector3d& force_B = Eigen::Vector3d::Zero()) {
+    t_ns_ += std::llround(1e9 / rate_);
+    const Eigen::Vector3d rest_B(0.0, 0.0, kGravity);
+    return ingest_.store({t_ns_, rate_B + random(gyro_sigma()),
+                          rest_B + force_B + random(ImuCalibration{}.accel_noise * std::sqrt(rate_))});
+  }
+  void rest(double seconds) {
+    for (double t = 0.0; t < seconds; t += dt()) CHECK_FALSE(add().any());
+  }
+  Eigen::Vector3d random(double sigma) {
+    std::normal_distribution<double> normal(0.0, sigma);
+    const double x = normal(rng_), y = normal(rng_), z = normal(rng_);
+    return {x, y, z};
+  }
+  /// Largest of the last samples' rates, and deviations from gravity.
+  std::pair<double, double> largest(std::size_t count) const {
+    double rate = 0.0, force = 0.0;
+    for (std::size_t i = samples().size() - count; i < samples().size(); ++i) {
+      rate = std::max(rate, samples()[i].gyro_B.norm());
+      force = std::max(force, (samples()[i].accel_B - Eigen::Vector3d(0.0, 0.0, kGravity)).norm());
+    }
+    return {rate, force};
+  }
+
+ private:
+  static Calibration calibration(double rate_hz) {
+    Calibration calibration;
+    calibration.imu.rate_hz = rate_hz;
+    return calibration;
+  }
+
+  double rate_;
+  Ingest ingest_;
+  std::mt19937_64 rng_{29};
+  TimeNs t_ns_ = 0;
+};
+
+const Eigen::Vector3d kTurn(2.0, -1.5, 1.0);       // [rad/s]
+const Eigen::Vector3d kForce(-20.0, 30.0, -15.0);  // [m/s^2]
+const Eigen::Vector3d kNone = Eigen::Vector3d::Zero();
+
+}  // namespace
+
+TEST_CASE("imu spike: one to five samples of either sensor or of both are replaced, at 50 to 1000 Hz") {
+  for (const double rate_hz : {50.0, 100.0, 200.0, 400.0, 1000.0}) {
+    for (const bool gyro : {false, true}) {
+      for (const bool accel : {false, true}) {
+        for (std::size_t length = 1; length <= 5; ++length) {
+          if (!gyro && !accel) continue;
+          CAPTURE(rate_hz);
+          CAPTURE(gyro);
+          CAPTURE(accel);
+          CAPTURE(length);
+          Stream stream(rate_hz);
+          stream.rest(1.0);
+          for (std::size_t i = 0; i < length; ++i) {
+            CHECK_FALSE(stream.add(gyro ? kTurn : kNone, accel ? kForce : kNone).any());
+          }
+          const ImuFault fault = stream.add();
+          CHECK(fault.gyro == gyro);
+          CHECK(fault.accel == accel);
+          CHECK(stream.spikes() == 1);
+          CHECK(stream.largest(8).first < 6.0 * stream.gyro_sigma());
+          CHECK(stream.largest(8).second < 2.0);
+          stream.rest(0.5);
+        }
+      }
+    }
+  }
+}
+
+TEST_CASE("imu spike: until its end is seen, the rate before it is held, with all of the deviation as noise") {
+  Stream stream;
+  stream.rest(1.0);
+  for (int i = 0; i < 5; ++i) {
+    stream.add(kTurn);
+    CHECK(stream.largest(1).first < 0.1);
+    const TimeNs newest_ns = stream.samples().newest().t_ns;
+    CHECK(stream.samples().mean_rate(newest_ns - 1'000'000, newest_ns).noise_factor * stream.gyro_sigma() > 2.5);
+  }
+  stream.add();
+  const TimeNs newest_ns = stream.samples().newest().t_ns;
+  const MeanRate crossed = stream.samples().mean_rate(newest_ns - 25'000'000, newest_ns);
+  CHECK(crossed.noise_factor > 1.0);
+  CHECK(crossed.noise_factor < 15.0);  // 0.2 rad/s
+}
+
+TEST_CASE("imu spike: a change that lasts is given back, as it was measured, with the sixth sample") {
+  Stream stream;
+  stream.rest(1.0);
+  for (int i = 0; i < 6; ++i) CHECK_FALSE(stream.add(kTurn, kForce).any());
+  for (std::size_t i = 1; i <= 6; ++i) {
+    const ImuSample& sample = stream.samples()[stream.samples().size() - i];
+    CHECK((sample.gyro_B - kTurn).norm() < 0.1);
+    CHECK((sample.accel_B - Eigen::Vector3d(0.0, 0.0, kGravity) - kForce).norm() < 1.5);
+  }
+  for (int i = 0; i < 100; ++i) CHECK_FALSE(stream.add(kTurn, kForce).any());
+  CHECK(stream.spikes() == 0);
+}
+
+TEST_CASE("imu spike: a gap ends what might have been one") {
+  Stream stream(10.0);  // 100 ms from sample to sample
+  stream.rest(2.0);
+  stream.add(kTurn);
+  CHECK_FALSE(stream.add().any());
+  CHECK(stream.spikes() == 0);
+}
+
+TEST_CASE("imu spike: strikes of 10 to 50 ms are not taken for one") {
+  for (const double rate_hz : {100.0, 200.0, 400.0, 1000.0}) {
+    for (const double duration : {0.02, 0.03, 0.05}) {
+      for (const double phase : {0.2, 0.5, 0.8}) {
+        CAPTURE(rate_hz);
+        CAPTURE(duration);
+        CAPTURE(phase);
+        Stream stream(rate_hz);
+        if (duration < 3.0 * stream.dt()) continue;  // two samples that are alike: the next test
+        stream.rest(1.0);
+        double left = 0.0;
+        for (double t = phase * stream.dt(); t < duration; t += stream.dt()) {
+          CHECK_FALSE(stream.add(kNone, {5.0, 0.0, 60.0 * std::sin(M_PI * t / duration)}).any());
+        }
+        stream.rest(0.3);
+        for (std::size_t i = 0; i < stream.samples().size(); ++i) {
+          left += stream.dt() * (stream.samples()[i].accel_B.z() - kGravity);
+        }
+        CHECK(left == doctest::Approx(60.0 * duration * 2.0 / M_PI).epsilon(0.15));
+      }
+    }
+  }
+}
+
+TEST_CASE("imu spike: of two samples of the accelerometer that are alike, all of the deviation stays as noise") {
+  Stream stream;
+  stream.rest(1.0);
+  for (int i = 0; i < 2; ++i) stream.add(kNone, kForce);
+  CHECK(stream.add().accel);
+  double largest = 0.0;
+  stream.samples().for_each_piece(
+      stream.samples()[stream.samples().size() - 3].t_ns, stream.samples().newest().t_ns,
+      [&](const Eigen::Vector3d&, const Eigen::Vector3d&, double, const ImuNoiseFactors& noise) {
+        largest = std::max(largest, noise.accel * ImuCalibration{}.accel_noise * std::sqrt(200.0));
+      });
+  CHECK(largest > 0.9 * kForce.norm() / std::sqrt(3.0));  // of one axis
+}
+
+TEST_CASE("imu spike: fast turns that begin and end smoothly are none, nor is vibration") {
+  for (const double rate_hz : {50.0, 100.0, 200.0, 400.0, 1000.0}) {
+    CAPTURE(rate_hz);
+    Stream stream(rate_hz);
+    stream.rest(1.0);
+    for (double t = 0.0; t < 4.0; t += stream.dt()) {  // 6 rad/s, up to 57 rad/s^2
+      CHECK_FALSE(stream.add({6.0 * std::sin(9.5 * t), 0.0, 0.0}).any());
+    }
+    stream.rest(0.5);
+    for (double t = 0.0; t < 10.0; t += stream.dt()) {  // rotors that speed up for 2 s
+      const double share = std::min(1.0, 0.5 * t);
+      CHECK_FALSE(stream.add(stream.random(0.3 * share), stream.random(3.0 * share)).any());
+    }
+    CHECK(stream.spikes() == 0);
+  }
+}
+
+TEST_CASE("imu spike: it is found in vibration that is smaller") {
+  Stream stream;
+  for (int i = 0; i < 400; ++i) stream.add(stream.random(0.1), stream.random(1.0));
+  for (int i = 0; i < 3; ++i) stream.add(kTurn + stream.random(0.1), kForce + stream.random(1.0));
+  CHECK(stream.add(stream.random(0.1), stream.random(1.0)).gyro);
+  CHECK(stream.largest(4).first < 0.6);
+  CHECK(stream.largest(4).second < 6.0);
+}
