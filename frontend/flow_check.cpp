@@ -19,6 +19,8 @@ constexpr double kConfidence = 0.999;
 constexpr double kGoodGuess = 0.8;          // share of inliers at which a known motion needs no search
 constexpr double kUnknownDepthSigma = 3.0;  // [1/m] a feature without depth may be anywhere beyond 0.2 m or so
 constexpr int kRefinements = 3;
+constexpr double kStill = 0.5;  // times the tolerance: a smaller flow is none
+constexpr double kMoved = 3.0;  // times the tolerance: so far off the known motion is more than its error
 
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
@@ -41,6 +43,21 @@ double squared_distance(const Flow& flow, const Transfer& motion, double depth_s
   // The error's variance is the unit of distance plus `along along^T`; the unit is small against it where it matters.
   constexpr double kUnit = 1e-6;  // (0.4 px)^2 at 400 px focal length
   return error.squaredNorm() - projection * projection / (kUnit + along.squaredNorm());
+}
+
+// Does it stay where it is in the image, although the known motion would have moved it, at whatever depth? Then it is a
+// fixed pattern of the sensor, dirt on the lens, or a part of the vehicle.
+bool moves_with_camera(const Flow& flow, const MotionGuess& guess, double tolerance) {
+  if (!guess.translation_known || (flow.x1 - flow.x0).norm() > kStill * tolerance) return false;
+  Flow anywhere = flow;
+  anywhere.has_depth = false;
+  return squared_distance(anywhere, guess.motion, kUnknownDepthSigma) > std::pow(kMoved * tolerance, 2);
+}
+
+void drop_fixed(const std::vector<Flow>& flows, const MotionGuess& guess, double tolerance, Flags& flags) {
+  for (std::size_t i = 0; i < flows.size(); ++i) {
+    if (moves_with_camera(flows[i], guess, tolerance)) flags[i] = 0;
+  }
 }
 
 // Everything that is fixed during one check.
@@ -184,7 +201,9 @@ Flags essential_inliers(const std::vector<Flow>& flows, double tolerance) {
 
 Consensus FlowCheck::find(const std::vector<Flow>& flows, const MotionGuess& guess) {
   if (flows.size() < kMinFlows) {
-    return {Flags(flows.size(), std::uint8_t{guess.rotation_known}), guess.motion, false};
+    Flags flags(flows.size(), std::uint8_t{guess.rotation_known});
+    drop_fixed(flows, guess, tolerance_, flags);
+    return {flags, guess.motion, false};
   }
   std::vector<std::size_t> with_depth;
   for (std::size_t i = 0; i < flows.size(); ++i) {
@@ -216,6 +235,7 @@ Consensus FlowCheck::find(const std::vector<Flow>& flows, const MotionGuess& gue
           return Transfer{guess.motion.R_10, *p};
         },
         best);
+    drop_fixed(flows, guess, tolerance_, best.flags);
     return {best.flags, guess.motion, false};
   }
 

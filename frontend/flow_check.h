@@ -41,6 +41,8 @@ class FlowCheck {
   explicit FlowCheck(double tolerance) : tolerance_(tolerance) {}
 
   /// With too few flows to measure it, the motion is the guess; all are inliers if its rotation is known, else none is.
+  /// Where no depths tell the motion, flows of length zero that a fully known guess would have moved, whatever their
+  /// depth, are no inliers: what they show moves with the camera.
   [[nodiscard]] Consensus find(const std::vector<Flow>& flows, const MotionGuess& guess);
 
  private:

@@ -129,6 +129,19 @@ void add_noise(cv::Mat& image, double sigma, std::mt19937& random) {
   }
 }
 
+void add_noise(cv::Mat& image, const Noise& noise, std::mt19937& random) {
+  std::normal_distribution<double> normal;
+  std::uniform_real_distribution<double> uniform;
+  for (int row = 0; row < image.rows; ++row) {
+    const double offset = noise.row * normal(random);
+    for (int column = 0; column < image.cols; ++column) {
+      auto& pixel = image.at<std::uint8_t>(row, column);
+      const double heat = uniform(random) < noise.hot_share ? 150.0 * uniform(random) : 0.0;
+      pixel = cv::saturate_cast<std::uint8_t>(pixel + offset + heat + noise.pixel * normal(random));
+    }
+  }
+}
+
 std::vector<CameraCalibration> test_stereo_pair(LensModel lens) {
   CameraCalibration left;
   left.width = 320;

@@ -43,6 +43,14 @@ class Camera {
 /// Adds sensor noise [grey values].
 void add_noise(cv::Mat& image, double sigma, std::mt19937& random);
 
+/// What a sensor adds to an image in the dark.
+struct Noise {
+  double pixel = 0.0;      ///< of each pixel [grey values]
+  double hot_share = 0.0;  ///< of the pixels; they are up to 150 grey values too bright
+  double row = 0.0;        ///< of whole rows [grey values]
+};
+void add_noise(cv::Mat& image, const Noise& noise, std::mt19937& random);
+
 /// A pair of 320x240 cameras, 8 cm apart, looking along the body's z axis; the body is the left camera.
 std::vector<CameraCalibration> test_stereo_pair(LensModel lens = LensModel::radial_tangential);
 

@@ -1,6 +1,7 @@
 #include <doctest/doctest.h>
 
 #include <opencv2/core.hpp>
+#include <random>
 #include <set>
 #include <utility>
 
@@ -69,6 +70,40 @@ TEST_CASE("detector: in half an image of texture, textured cells give more") {
   image(cv::Rect(0, 0, 320, 120)).setTo(100);
   Detector detector(320, 240, kWanted);
   CHECK(detector.detect(pyramid_of(image), {}, kWanted).size() > 70);
+}
+
+TEST_CASE("detector: noise is no texture, whatever its size and kind") {
+  std::mt19937 random(6);
+  Detector detector(320, 240, kWanted);
+  for (const Noise& noise : {Noise{1.0}, Noise{2.0}, Noise{3.0}, Noise{4.0}, Noise{8.0}, Noise{1.5, 0.001},
+                             Noise{1.5, 0.005}, Noise{3.0, 0.0, 4.0}, Noise{4.0, 0.001, 4.0}}) {
+    CAPTURE(noise.pixel);
+    CAPTURE(noise.hot_share);
+    CAPTURE(noise.row);
+    for (const double grey : {6.0, 100.0}) {
+      CAPTURE(grey);
+      std::size_t found = 0;
+      constexpr std::size_t kImages = 10;
+      for (std::size_t i = 0; i < kImages; ++i) {
+        cv::Mat image(240, 320, CV_8U, cv::Scalar(grey));
+        add_noise(image, noise, random);
+        found += detector.detect(pyramid_of(image), {}, kWanted).size();
+      }
+      CHECK(found <= kImages / 2);
+    }
+  }
+}
+
+TEST_CASE("detector: weak texture under as much noise still gives corners") {
+  // Contrast of 0.15: a standard deviation of 7 grey values, most of it in waves of many pixels.
+  std::mt19937 random(7);
+  Detector detector(320, 240, kWanted);
+  for (const double sigma : {2.0, 3.0, 4.0}) {
+    CAPTURE(sigma);
+    cv::Mat image = random_texture(320, 240, 8, 0.15);
+    add_noise(image, sigma, random);
+    CHECK(detector.detect(pyramid_of(image), {}, kWanted).size() > 50);
+  }
 }
 
 TEST_CASE("detector: nothing wanted, nothing found") {

@@ -1,5 +1,6 @@
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <random>
 
 #include "frontend/flow_check.h"
@@ -132,6 +133,28 @@ TEST_CASE("flow check: too few flows say nothing") {
   CHECK_FALSE(unknown.metric);
   CHECK(FlowCheck(kPixel).find(example.flows, {{}, true, false}).inliers == std::vector<std::uint8_t>(5, 1));
   CHECK(FlowCheck(kPixel).find({}, {}).inliers.empty());
+}
+
+TEST_CASE("flow check: what stands still in the image of a camera that turns is not of the scene") {
+  const Eigen::Matrix3d R_10 = Eigen::AngleAxisd(0.03, Eigen::Vector3d::UnitY()).toRotationMatrix();  // 12 px
+  for (const int number : {5, 40}) {
+    CAPTURE(number);
+    std::vector<Flow> flows;
+    for (int i = 0; i < number; ++i) {
+      Flow flow;
+      flow.x0 = Eigen::Vector2d(0.1 * (i % 8) - 0.3, 0.1 + 0.05 * (i / 8));
+      flow.x1 = flow.x0 + Eigen::Vector2d(0.1 * kPixel, 0.0);
+      flows.push_back(flow);
+    }
+    const auto kept = [&](const Transfer& motion, bool translation_known) {
+      const auto inliers = FlowCheck(kPixel).find(flows, {motion, true, translation_known}).inliers;
+      return static_cast<int>(std::count(inliers.begin(), inliers.end(), 1));
+    };
+    CHECK(kept({R_10, {0.0, 0.001, 0.0}}, true) == 0);
+    CHECK(kept({Eigen::Matrix3d::Identity(), {0.0, 0.0, -0.02}}, true) == number);  // may be far away
+    CHECK(kept({R_10, {-0.02, 0.0, 0.0}}, true) >= number * 4 / 5);         // the translation makes up for the turn
+    CHECK(kept({R_10, Eigen::Vector3d::Zero()}, false) >= number * 4 / 5);  // or may do so
+  }
 }
 
 TEST_CASE("flow check: pure noise does not pass as a motion") {

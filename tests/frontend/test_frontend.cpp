@@ -2,6 +2,7 @@
 
 #include <doctest/doctest.h>
 
+#include <array>
 #include <cmath>
 #include <map>
 #include <opencv2/core.hpp>
@@ -245,6 +246,76 @@ TEST_CASE("front end: one camera, or one image, is enough") {
       if (i > 0) CHECK(run.tracked() > 60);
     }
     CHECK(run.wrong_stereo_share() < 0.005);
+  }
+}
+
+namespace {
+
+// What the dark leaves of a scene: a share of its light, and what the sensor adds to it. Some of that is the same in
+// every image of a camera.
+struct Darkness {
+  double light = 0.0;
+  Noise changing;
+  Noise fixed;
+};
+
+// Mean number of features per frame, and of those that the frame before had as well.
+struct Count {
+  double features = 0.0, tracked = 0.0;
+};
+
+// Over 30 frames of a turn with 4 px of flow per frame, predicted exactly.
+Count features_in(const Darkness& darkness) {
+  constexpr int kFrames = 30;
+  const auto cameras = test_stereo_pair();
+  const std::vector<Camera> renderers{Camera(cameras[0]), Camera(cameras[1])};
+  Frontend frontend({kFeatures, 0.3}, cameras);
+  const std::vector<TexturedRectangle> scene{wall(2.0, 33)};
+  std::mt19937 random(34);
+  std::array<cv::Mat, 2> dark;
+  for (cv::Mat& image : dark) {
+    image = cv::Mat(240, 320, CV_8U, cv::Scalar(10));
+    add_noise(image, darkness.fixed, random);
+  }
+  Count count;
+  Eigen::Isometry3d T_WB0 = Eigen::Isometry3d::Identity();
+  std::set<std::uint64_t> before;
+  for (int i = 0; i < kFrames; ++i) {
+    const Eigen::Isometry3d T_WB = at({0.0, 0.0, 0.01 * i}, 0.0, 0.02 * i);
+    std::array<cv::Mat, 2> images;
+    for (std::size_t k = 0; k < 2; ++k) {
+      images[k] = dark[k].clone();
+      if (darkness.light > 0.0) images[k] += darkness.light * renderers[k].render(T_WB, scene);
+      add_noise(images[k], darkness.changing, random);
+    }
+    std::set<std::uint64_t> now;
+    for (const FeatureObservation& feature :
+         frontend.process({i, view_of(images[0]), view_of(images[1])}, exact_motion(T_WB0, T_WB)).features) {
+      now.insert(feature.id);
+      count.features += 1.0 / kFrames;
+      count.tracked += before.count(feature.id) != 0 ? 1.0 / kFrames : 0.0;
+    }
+    before.swap(now);
+    T_WB0 = T_WB;
+  }
+  return count;
+}
+
+}  // namespace
+
+TEST_CASE("front end: noise gives no features in the dark, and leaves those of a dim scene") {
+  struct Case {
+    double sigma;  // of what changes from image to image [grey values]
+    Noise fixed;
+  };
+  for (const Case& sensor : {Case{4.0, {}}, Case{2.5, {2.0}}, Case{1.0, {0.0, 0.001}}, Case{2.5, {0.0, 0.005}},
+                             Case{1.0, {3.0, 0.001, 4.0}}}) {
+    CAPTURE(sensor.sigma);
+    CAPTURE(sensor.fixed.pixel);
+    CAPTURE(sensor.fixed.hot_share);
+    CAPTURE(sensor.fixed.row);
+    CHECK(features_in({0.0, {sensor.sigma}, sensor.fixed}).features < 1.0);
+    CHECK(features_in({0.3, {sensor.sigma}, sensor.fixed}).tracked > 65.0);
   }
 }
 

@@ -189,4 +189,33 @@ TEST_CASE("patch: no texture, no patch; no likeness, no match; outside, nothing"
   CHECK_FALSE(patch.capture(textured, {1000.0F, 10.0F}));
 }
 
+TEST_CASE("patch: noise does not match other noise, wherever the search begins") {
+  // Also where it is wider than a pixel, as of a camera that smooths its images.
+  std::mt19937 random(9);
+  for (const double blur : {0.0, 0.7, 1.0}) {
+    CAPTURE(blur);
+    std::array<ImagePyramid, 2> pyramids;
+    for (ImagePyramid& pyramid : pyramids) {
+      cv::Mat image(240, 320, CV_8U, cv::Scalar(100));
+      add_noise(image, 16.0, random);
+      if (blur > 0.0) cv::GaussianBlur(image, image, cv::Size(), blur);
+      pyramid.build(view_of(image));
+    }
+    int tried = 0;
+    int matched = 0;
+    for (float v = 20.5F; v < 220.0F; v += 6.0F) {
+      for (float u = 20.5F; u < 300.0F; u += 6.0F) {
+        ReferencePatch patch;
+        if (!patch.capture(pyramids[0], {u, v})) continue;
+        for (const int level : {0, 2, 3}) {
+          ++tried;
+          matched += patch.align(pyramids[1], {{u, v}}, level) ? 1 : 0;
+        }
+      }
+    }
+    CHECK(tried > 4000);
+    CHECK(matched <= tried / 1000);
+  }
+}
+
 }  // namespace ear
