@@ -51,7 +51,7 @@ std::optional<Estimate> Filter::process(const FeatureFrame& given) {
     } else {
       sources_.go_without_image(advice, ekf_, records_);
     }
-    watch_biases(true);
+    watch_biases();
   }
   if (use_image) sources_.cameras().remember(frame, ekf_);
   return report(true, seen);
@@ -63,7 +63,7 @@ std::optional<Estimate> Filter::process_without_image(TimeNs t_ns) {
   propagate_to(FeatureFrame{t_ns, {}});
   if (ekf_.running()) {
     sources_.go_without_image(advise(consistency_, health_.health(), config_.anomaly), ekf_, records_);
-    watch_biases(false);
+    watch_biases();
   }
   return report(false, FrameAgreement{});
 }
@@ -85,16 +85,14 @@ void Filter::propagate_to(const FeatureFrame& frame) {
   }
 }
 
-/// A bias that jumped is as little known as at the start, and took the motion along until it was found out.
-void Filter::watch_biases(bool image) {
-  const TimeNs t_ns = ekf_.state().imu.t_ns;
-  const ImuFault jumped = bias_watch_.judge(ekf_.take_bias_changes(), t_ns, image);
-  if (!jumped.any()) return;
-  const double gyro = jumped.gyro ? config_.prior.gyro_bias : 0.0;
-  const double accel = jumped.accel ? config_.prior.accel_bias : 0.0;
-  ekf_.inflate_motion(gyro * kJumpNoticed, accel * kJumpNoticed, 0.5 * accel * kJumpNoticed * kJumpNoticed);
-  ekf_.inflate_biases(gyro, accel);
-  health_.report_imu_fault(jumped.gyro, jumped.accel, t_ns);
+/// A bias that jumped took the motion along until it was found out. Both are less well known by what was observed.
+void Filter::watch_biases() {
+  const BiasJump jump = bias_watch_.judge(ekf_.take_bias_changes(), ekf_.state().imu.t_ns);
+  if (!jump.any()) return;
+  ekf_.inflate_motion(jump.gyro * kJumpNoticed, jump.accel * kJumpNoticed,
+                      0.5 * jump.accel * kJumpNoticed * kJumpNoticed);
+  ekf_.inflate_biases(jump.gyro, jump.accel);
+  health_.report_imu_fault(jump.fault.gyro, jump.fault.accel, ekf_.state().imu.t_ns);
 }
 
 /// What is given away of the state, and whether it is.

@@ -76,7 +76,7 @@ class Filter final : public Estimator {
 
  private:
   void propagate_to(const FeatureFrame& frame);
-  void watch_biases(bool image);
+  void watch_biases();
   void start(const FeatureFrame& frame);
   void stop();
   void restart(TimeNs t_ns, TimeNs clock_shift);

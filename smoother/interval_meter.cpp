@@ -4,13 +4,11 @@
 #include <cmath>
 
 #include "filter/ekf/propagation.h"
-#include "filter/sources/wheels/wheel_agreement.h"
 #include "filter/sources/wheels/wheel_displacement.h"
 
 namespace ear::smoother {
 namespace {
 
-constexpr double kRefused = 1.0;          // [m] standard deviation of a direction of which the wheels show nothing
 constexpr TimeNs kRateOver = 10'000'000;  // [ns] over which the rate at a frame is averaged
 constexpr int kDirections = 3;            // in which the wheels are gated
 
@@ -37,7 +35,7 @@ IntervalMeter::IntervalMeter(const FilterConfig& config, const Calibration& cali
 
 void IntervalMeter::begin(bool stands) {
   normal_.forget();
-  agrees_since_ns_.fill(0);
+  scores_ = {};
   was_still_ = stands;
 }
 
@@ -141,17 +139,17 @@ bool IntervalMeter::add_noise(WheelDisplacement& z, const Situation& now, Record
   for (std::size_t i = 0; i < directions.size(); ++i) {
     const Eigen::Vector3d& u = directions[i];
     const double d = u.dot(wheels.p_BiBj - inertial.p_BiBj);
-    const double variance = u.dot((inertial.covariance + wheels.covariance) * u);
-    const bool fits = gate_.fits(d, variance);
+    const double inertial_variance = u.dot(inertial.covariance * u);
+    const double noise = u.dot(wheels.covariance * u);
+    const bool fits = gate_.fits(d, inertial_variance + noise);
     if (i == 0) {  // both wheels together, as a speed
-      const Innovation speed{d / z.duration, variance / (z.duration * z.duration), gate_.quantile(1), fits};
+      const double per_time = 1.0 / (z.duration * z.duration);
+      const Innovation speed{d / z.duration, (inertial_variance + noise) * per_time, gate_.quantile(1), fits};
       for (const Source wheel : {Source::wheel_left, Source::wheel_right}) records.log.add(wheel, speed, now.t_ns);
     }
-    if (agrees_again(agrees_since_ns_[i], fits, now.t_ns)) {
-      ++left;
-    } else {
-      covariance += kRefused * kRefused * u * u.transpose();
-    }
+    const double factor = scores_[i].add(d, {inertial_variance, noise, true}, now.t_ns);
+    covariance += (factor - 1.0) * u.dot(covariance * u) * u * u.transpose();
+    left += scores_[i].fits() ? 1 : 0;
   }
   records.statistics.wheel_rows_used += left;
   records.statistics.wheel_rows_rejected += kDirections - left;

@@ -11,6 +11,7 @@
 #include "filter/advice.h"
 #include "filter/ekf/displacement.h"
 #include "filter/ekf/gate.h"
+#include "filter/ekf/noise_score.h"
 #include "filter/ekf/records.h"
 #include "filter/ekf/state.h"
 #include "filter/ingest/ingest.h"
@@ -58,10 +59,10 @@ class IntervalMeter {
   WheelNoise wheel_noise_;
   Gate gate_;
   GroundNormal normal_;
-  TimeNs normal_ns_ = 0;                     ///< up to where it was moved
-  double speed_ = 0.0;                       ///< of the wheels of late [m/s]
-  std::array<TimeNs, 3> agrees_since_ns_{};  ///< the wheels with the inertial samples: forward, sideways, upwards
-  bool was_still_ = false;                   ///< at the frame before
+  TimeNs normal_ns_ = 0;              ///< up to where it was moved
+  double speed_ = 0.0;                ///< of the wheels of late [m/s]
+  std::array<NoiseScore, 3> scores_;  ///< the wheels with the inertial samples: forward, sideways, upwards
+  bool was_still_ = false;            ///< at the frame before
 };
 
 }  // namespace ear::smoother

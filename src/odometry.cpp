@@ -93,7 +93,10 @@ class Odometry::Impl {
       learned.encoder->T_BO = isometry(odometer.T_BO);
     }
     if (learned.lasers) {
-      for (std::size_t i = 0; i < learned.lasers->beams.size(); ++i) learned.lasers->beams[i].d_B = odometer.d_B[i];
+      for (std::size_t i = 0; i < learned.lasers->beams.size(); ++i) {
+        LaserBeam& beam = learned.lasers->beams[i];
+        beam.p_BL -= odometer.beam_offset(static_cast<Eigen::Index>(i)) * beam.d_B;
+      }
     }
     return learned;
   }

@@ -19,6 +19,7 @@ int error_capacity(const FilterConfig& config) { return err::clone(config.window
 Ekf::Ekf(const FilterConfig& config, const Calibration& calibration)
     : calibration_(calibration),
       normal_prior_(config.odometer.normal_prior),
+      wheel_apart_(std::sqrt(2.0) * config.prior.wheel_apart),
       gate_(config.gate_probability, 4 * (config.window + 1)),
       covariance_(error_capacity(config)) {
   state_.clones.reserve(static_cast<std::size_t>(config.window) + 1);
@@ -29,6 +30,8 @@ void Ekf::start(const ImuState& x, const Eigen::VectorXd& sigma, bool scale_is_g
   running_ = true;
   state_.imu = x;
   covariance_.reset(sigma);
+  const Eigen::RowVector2d apart(1.0 / wheel_apart_, -1.0 / wheel_apart_);
+  covariance_.update(apart, err::wheel_radius, Eigen::Matrix<double, 1, 1>::Zero());
   if (!scale_is_given) return;
   const Eigen::RowVector2d mean_is_known(0.5 / kKnownScale, 0.5 / kKnownScale);
   covariance_.update(mean_is_known, err::wheel_radius, Eigen::Matrix<double, 1, 1>::Zero());
@@ -84,15 +87,13 @@ std::optional<TimeNs> Ekf::propagate(const ImuBuffer& samples, TimeNs t_ns, cons
 }
 
 void Ekf::apply(const Eigen::Ref<const Eigen::MatrixXd>& H, int first_column,
-                const Eigen::Ref<const Eigen::VectorXd>& r, CameraUpdate calibration, bool by_images) {
+                const Eigen::Ref<const Eigen::VectorXd>& r, CameraUpdate calibration) {
   const int considered = calibration == CameraUpdate::learned ? 0 : err::calibration_size;
   const auto variance = [this] { return covariance_.matrix().diagonal().segment<6>(err::b_g); };
-  const BiasChange::Vector6 before = variance();
+  const BiasChanges::Vector6 before = variance();
   const Eigen::Ref<const Eigen::VectorXd> correction = covariance_.update(H, first_column, r, err::camera, considered);
   if (!correction.allFinite()) return;  // the covariance shows it: possible()
-  const BiasChange::Vector6 lowered = before - variance();
-  bias_changes_.all.add(correction.segment<6>(err::b_g), lowered);
-  if (by_images) bias_changes_.by_images.add(correction.segment<6>(err::b_g), lowered);
+  bias_changes_.add(correction.segment<6>(err::b_g), before - variance());
   boxplus_in_place(state_, correction);
 }
 
@@ -155,7 +156,8 @@ bool Ekf::possible() const {
                       x.p_WB.allFinite() && x.v_W.allFinite() && x.b_g.allFinite() && x.b_a.allFinite() &&
                       state_.camera.T_BC0.R.allFinite() && state_.camera.T_BC0.p.allFinite() &&
                       o.wheel_radius.allFinite() && std::isfinite(o.track_width) && o.T_BO.R.allFinite() &&
-                      state_.ground.n_W.allFinite() && std::isfinite(P.sum());  // one that is not makes the sum so
+                      o.T_BO.p.allFinite() && o.beam_offset.allFinite() && state_.ground.n_W.allFinite() &&
+                      std::isfinite(P.sum());  // one that is not makes the sum so
   return finite && P.diagonal().minCoeff() >= 0.0;
 }
 

@@ -83,9 +83,9 @@ class Ekf {
     return kept > 0;
   }
 
-  /// Updates by whitened rows: residual = H e(first_column ...) + n, cov(n) = I. `by_images`: for BiasChanges.
+  /// Updates by whitened rows: residual = H e(first_column ...) + n, cov(n) = I.
   void apply(const Eigen::Ref<const Eigen::MatrixXd>& H, int first_column, const Eigen::Ref<const Eigen::VectorXd>& r,
-             CameraUpdate calibration, bool by_images = false);
+             CameraUpdate calibration);
 
   /// The body's pose now joins the window. `feature_noise`: of what was seen from it, times the usual.
   void clone(double feature_noise);
@@ -117,6 +117,7 @@ class Ekf {
  private:
   Calibration calibration_;
   double normal_prior_;  ///< [rad]
+  double wheel_apart_;   ///< of the difference of the wheel radii, relative
   Gate gate_;
   bool running_ = false;
   State state_;

@@ -85,9 +85,6 @@ OdometerState odometer_state(const Calibration& calibration) {
     odometer.track_width = encoder->track_width;
     odometer.T_BO = {renormalized(encoder->T_BO.linear()), encoder->T_BO.translation()};
   }
-  if (const auto& lasers = calibration.lasers) {
-    for (std::size_t i = 0; i < lasers->beams.size(); ++i) odometer.d_B[i] = lasers->beams[i].d_B.normalized();
-  }
   return odometer;
 }
 

@@ -43,19 +43,16 @@ class InnovationLog {
 
 /// What updates did to the biases: the corrections, and by how much they lowered the variances. Gyroscope [rad/s], then
 /// accelerometer [m/s^2].
-struct BiasChange {
+struct BiasChanges {
   using Vector6 = Eigen::Matrix<double, 6, 1>;
   Vector6 correction = Vector6::Zero();
   Vector6 variance_lowered = Vector6::Zero();
+  bool restarted = false;  ///< what came before does not count
 
   void add(const Vector6& more_correction, const Vector6& more_lowered) {
     correction += more_correction;
     variance_lowered += more_lowered.cwiseMax(0.0);
   }
-};
-struct BiasChanges {
-  BiasChange all, by_images;
-  bool restarted = false;  ///< what came before does not count
 };
 
 /// What the sources write while a frame is processed.

@@ -52,12 +52,6 @@ Eigen::Matrix<double, 3, 2> tangent_basis(const Eigen::Vector3d& n) {
   return B;
 }
 
-Eigen::Vector3d tilt_axis(const Eigen::Vector3d& d, const Eigen::Vector3d& up) {
-  const Eigen::Vector3d axis = d.cross(up);
-  if (axis.norm() > 1e-3) return axis.normalized();
-  return d.cross(Eigen::Vector3d::UnitX()).normalized();  // straight down: no tilt changes the range
-}
-
 void boxplus_in_place(State& x, const Eigen::Ref<const Eigen::VectorXd>& d) {
   const Eigen::Matrix3d E = exp_so3(d.segment<3>(err::theta));
   x.imu.R_WB = renormalized(E * x.imu.R_WB);
@@ -66,13 +60,11 @@ void boxplus_in_place(State& x, const Eigen::Ref<const Eigen::VectorXd>& d) {
   x.imu.b_g += d.segment<3>(err::b_g);
   x.imu.b_a += d.segment<3>(err::b_a);
   x.ground.n_W = (E * exp_so3(tangent_basis(x.ground.n_W) * d.segment<2>(err::normal)) * x.ground.n_W).normalized();
-  for (int i = 0; i < kMaxBeams; ++i) {
-    Eigen::Vector3d& d_B = x.odometer.d_B[static_cast<std::size_t>(i)];
-    d_B = exp_so3(tilt_axis(d_B, x.odometer.T_BO.R.col(2)) * d(err::beams + i)) * d_B;
-  }
+  x.odometer.beam_offset += d.segment<kMaxBeams>(err::beams);
   x.odometer.wheel_radius.array() *= 1.0 + d.segment<2>(err::wheel_radius).array();
   x.odometer.track_width *= 1.0 + d(err::track_width);
   x.odometer.T_BO.R = renormalized(x.odometer.T_BO.R * exp_so3(d.segment<3>(err::odometer)));
+  x.odometer.T_BO.p += d.segment<3>(err::axle);
   apply_local(x.camera.T_BC0, d.segment<3>(err::camera), d.segment<3>(err::camera + 3));
   apply_local(x.camera.T_C0C1, d.segment<3>(err::stereo), d.segment<3>(err::stereo + 3));
   x.camera.time_offset += d(err::time_offset);
@@ -102,12 +94,8 @@ Eigen::VectorXd boxminus(const State& truth, const State& estimate) {
       truth.odometer.wheel_radius.cwiseQuotient(estimate.odometer.wheel_radius).array() - 1.0;
   d(err::track_width) = truth.odometer.track_width / estimate.odometer.track_width - 1.0;
   d.segment<3>(err::odometer) = log_so3(estimate.odometer.T_BO.R.transpose() * truth.odometer.T_BO.R);
-  for (int i = 0; i < kMaxBeams; ++i) {
-    const auto k = static_cast<std::size_t>(i);
-    const Eigen::Vector3d& beam = estimate.odometer.d_B[k];
-    const Eigen::Vector3d axis = tilt_axis(beam, estimate.odometer.T_BO.R.col(2));
-    d(err::beams + i) = axis.dot(rotation_between(beam, truth.odometer.d_B[k]));
-  }
+  d.segment<3>(err::axle) = truth.odometer.T_BO.p - estimate.odometer.T_BO.p;
+  d.segment<kMaxBeams>(err::beams) = truth.odometer.beam_offset - estimate.odometer.beam_offset;
   d.segment<6>(err::camera) = local_difference(truth.camera.T_BC0, estimate.camera.T_BC0);
   d.segment<6>(err::stereo) = local_difference(truth.camera.T_C0C1, estimate.camera.T_C0C1);
   d(err::time_offset) = truth.camera.time_offset - estimate.camera.time_offset;

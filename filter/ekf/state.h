@@ -27,7 +27,8 @@ inline constexpr int normal = imu_size;           ///< delta, tilt of the ground
 inline constexpr int wheel_radius = normal + 2;   ///< left, right, relative: 2
 inline constexpr int track_width = normal + 4;    ///< relative: 1
 inline constexpr int odometer = normal + 5;       ///< phi, turn of O about its own axes [rad]: 3
-inline constexpr int beams = odometer + 3;        ///< tilt of each laser beam [rad]
+inline constexpr int axle = odometer + 3;         ///< position of O in the body [m]: 3
+inline constexpr int beams = axle + 3;            ///< offset of each laser beam's range [m]
 inline constexpr int camera = beams + kMaxBeams;  ///< phi, p of camera 0 in the body: 6
 inline constexpr int stereo = camera + 6;         ///< phi, p of camera 1 in camera 0: 6
 inline constexpr int time_offset = stereo + 6;    ///< [s]
@@ -67,9 +68,8 @@ struct OdometerState {
   Eigen::Vector2d wheel_radius = Eigen::Vector2d::Ones();  ///< left, right [m]
   double track_width = 1.0;                                ///< [m]
   Pose T_BO;                                               ///< middle of the axle to body
-  std::array<Eigen::Vector3d, kMaxBeams> d_B;              ///< directions of the laser beams
-
-  OdometerState() { d_B.fill(-Eigen::Vector3d::UnitZ()); }
+  Eigen::Matrix<double, kMaxBeams, 1> beam_offset =
+      Eigen::Matrix<double, kMaxBeams, 1>::Zero();  ///< of the laser beams: measured less true range [m]
 };
 
 /// The cameras' geometry as the filter knows it.
@@ -102,10 +102,6 @@ struct State {
 
 /// Two unit vectors, as columns, that span the plane perpendicular to the unit vector n; smooth except at n = -z.
 [[nodiscard]] Eigen::Matrix<double, 3, 2> tangent_basis(const Eigen::Vector3d& n);
-
-/// The unit axis about which an error of a beam's direction d turns it: the one that changes its range on a ground
-/// perpendicular to `up`.
-[[nodiscard]] Eigen::Vector3d tilt_axis(const Eigen::Vector3d& d, const Eigen::Vector3d& up);
 
 /// x with the error d applied; d has x.error_size() entries.
 void boxplus_in_place(State& x, const Eigen::Ref<const Eigen::VectorXd>& d);

@@ -1,6 +1,6 @@
 // Did the bias of the gyroscope or of the accelerometer jump? Sound biases walk slowly, and each update corrects them
 // about as much as it lowers their variance. Corrections that add up to more than these variances allow show a bias
-// that is elsewhere. docs/filter.md, "Gaps and jumps".
+// that is elsewhere: by as much as was observed, no more. docs/filter.md, "Gaps and jumps".
 #pragma once
 
 #include "ear/types.h"
@@ -9,15 +9,27 @@
 
 namespace ear {
 
+/// By how much the biases seem to have jumped: gyroscope [rad/s], accelerometer [m/s^2]; the axis with most of it, 0 if
+/// none did.
+struct BiasJump {
+  double gyro = 0.0;
+  double accel = 0.0;
+  /// Over the last moments it was more than the bias of a sound sensor changes by. Less only shows that the updates'
+  /// innovations are not white: the same scene, the same slip, the same wrong calibration.
+  ImuFault fault;
+
+  [[nodiscard]] bool any() const { return gyro > 0.0 || accel > 0.0; }
+};
+
 class BiasWatch {
  public:
-  /// What all updates since the last call did, the state now being at `t_ns`, with an image (`image`) or without: then
-  /// it takes more, for wheels that slip for long look like a bias that jumped. What speaks for a jump is forgotten
-  /// when it was reported. Updates by images count sooner: wheels that leave the ground unnoticed mislead.
-  ImuFault judge(const BiasChanges& changes, TimeNs t_ns, bool image);
+  /// What all updates since the last call did, the state now being at `t_ns`. What speaks for a jump is forgotten when
+  /// it was found.
+  BiasJump judge(const BiasChanges& changes, TimeNs t_ns);
 
  private:
-  BiasChange all_, by_images_;
+  BiasChanges sum_;                                            ///< since the last jump
+  BiasChanges::Vector6 moved_ = BiasChanges::Vector6::Zero();  ///< by jumps and all, of late
   TimeNs judged_ns_ = 0;
 };
 

@@ -15,6 +15,7 @@ constexpr double kUnaided = 2.0;         // [s] chosen: that inertia alone may c
 constexpr double kWorstVelocity = 1.0;   // [m/s] chosen: standard deviation of a velocity that is known,
 constexpr double kWorstDirection = 0.2;  // [rad] or of its direction, if more: one that is fast need not know it better
 constexpr double kContradicted = 1.0;    // [s] chosen
+constexpr double kFastest = 100.0;       // [m/s] chosen: no vehicle with wheels and rotors is faster
 
 constexpr int kFullQuality = 100;  // of a vehicle that stands; Health::quality
 constexpr int kWheelQuality = 40;
@@ -167,12 +168,12 @@ void HealthMonitor::judge_ground(const Frame& frame, const std::array<SourceReco
 }
 
 bool HealthMonitor::velocity_known() const {
-  return last_.velocity_sigma < std::max(kWorstVelocity, kWorstDirection * last_.speed);
+  return last_.speed < kFastest && last_.velocity_sigma < std::max(kWorstVelocity, kWorstDirection * last_.speed);
 }
 
 bool HealthMonitor::wheels_carry(const FrameStatistics& frame) const {
   const bool sound = fault_of(Source::wheel_left).sound() || fault_of(Source::wheel_right).sound();
-  return wheels_ && frame.on_ground && sound && frame.wheel_rows_used > 0;
+  return wheels_ && frame.on_ground && sound && frame.wheel_rows_used > frame.wheel_rows_rejected;
 }
 
 /// What carries the estimate, as far as the last frame is not too old.

@@ -143,7 +143,8 @@ Eigen::VectorXd Start::sigma() const {
     if (online.odometer_rotation) {
       sigma.segment<3>(err::odometer).setConstant(beams > 0 ? prior.odometer_rotation : prior.odometer_unseen);
     }
-    if (online.beam_tilt) sigma.segment(err::beams, beams).setConstant(prior.beam_tilt);
+    if (online.axle) sigma.segment<3>(err::axle).setConstant(beams > 0 ? prior.axle : prior.axle_unseen);
+    if (online.beam_offset) sigma.segment(err::beams, beams).setConstant(prior.beam_offset);
   }
   return sigma;
 }

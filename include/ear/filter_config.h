@@ -23,17 +23,20 @@ struct StandstillConfig {
 struct PriorConfig {
   double gyro_bias = 0.1;           ///< [rad/s]
   double accel_bias = 0.05;         ///< [m/s^2]
-  double camera_rotation = 2e-3;    ///< [rad] camera 0 in the body, where it is estimated
+  double camera_rotation = 2.5e-3;  ///< [rad] camera 0 in the body, where it is estimated
   double camera_position = 1e-3;    ///< [m]
-  double stereo_rotation = 2e-4;    ///< [rad] camera 1 in camera 0
-  double stereo_position = 1e-4;    ///< [m]
-  double time_offset = 1e-3;        ///< [s] camera against IMU
-  double wheel_radius = 5e-3;       ///< of each wheel, relative
+  double stereo_rotation = 2e-3;    ///< [rad] camera 1 in camera 0, the error of its principal point included
+  double stereo_position = 5e-5;    ///< [m]
+  double time_offset = 2e-3;        ///< [s] camera against IMU
+  double wheel_radius = 4e-3;       ///< of both wheels alike, relative
+  double wheel_apart = 1e-3;        ///< of each wheel by itself, relative
   double wheel_scale = 1e-2;        ///< of both wheels alike, relative, where neither camera nor lasers exist
   double track_width = 5e-3;        ///< relative
   double odometer_rotation = 5e-3;  ///< [rad] odometer in the body
   double odometer_unseen = 5e-2;    ///< [rad] the same without lasers, where it is what was guessed
-  double beam_tilt = 5e-3;          ///< [rad] each laser beam
+  double axle = 3e-3;               ///< [m] middle of the axle in the body
+  double axle_unseen = 0.1;         ///< [m] the same without lasers
+  double beam_offset = 2e-3;        ///< [m] range of each laser beam
 };
 
 /// What is calibrated while running. A frozen quantity keeps its value, and its uncertainty is not accounted for.
@@ -42,7 +45,8 @@ struct OnlineCalibrationConfig {
   bool time_offset = true;        ///< camera against IMU
   bool wheels = true;             ///< wheel radii, and their track width where the yaw rate is used
   bool odometer_rotation = true;  ///< the odometer's mounting in the body
-  bool beam_tilt = false;         ///< the directions of the laser beams
+  bool axle = true;               ///< the middle of the axle in the body
+  bool beam_offset = true;        ///< what each laser beam reads too much
 };
 
 /// What is made of the wheels; the paper's Table II compares them.
@@ -67,7 +71,7 @@ struct OdometerConfig {
   double yaw_rate_sigma = 0.02;  ///< [rad/s]
   double normal_walk = 0.1;      ///< change of the ground's normal [rad/sqrt(m)]
   double normal_prior = 0.3;     ///< [rad] before the lasers saw it
-  double unevenness = 0.008;     ///< [m] of the ground under a beam against the plane through the wheels
+  double unevenness = 0.012;     ///< [m] of the ground under a beam against the plane through the wheels
 };
 
 /// When the vehicle is on the ground, and when it flies.

@@ -66,11 +66,14 @@ EnableFor<C, PriorConfig> visit(C& c, F&& f) {
   f("stereo_position", c.stereo_position);
   f("time_offset", c.time_offset);
   f("wheel_radius", c.wheel_radius);
+  f("wheel_apart", c.wheel_apart);
   f("wheel_scale", c.wheel_scale);
   f("track_width", c.track_width);
   f("odometer_rotation", c.odometer_rotation);
   f("odometer_unseen", c.odometer_unseen);
-  f("beam_tilt", c.beam_tilt);
+  f("axle", c.axle);
+  f("axle_unseen", c.axle_unseen);
+  f("beam_offset", c.beam_offset);
 }
 
 template <typename C, typename F>
@@ -93,7 +96,8 @@ EnableFor<C, OnlineCalibrationConfig> visit(C& c, F&& f) {
   f("time_offset", c.time_offset);
   f("wheels", c.wheels);
   f("odometer_rotation", c.odometer_rotation);
-  f("beam_tilt", c.beam_tilt);
+  f("axle", c.axle);
+  f("beam_offset", c.beam_offset);
 }
 
 template <typename C, typename F>

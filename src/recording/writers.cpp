@@ -108,7 +108,7 @@ nlohmann::ordered_json to_json(const Calibration& calibration) {
   if (calibration.lasers) {
     json["beams"] = nlohmann::ordered_json::array();
     for (const LaserBeam& beam : calibration.lasers->beams) {
-      json["beams"].push_back({{"name", beam.name}, {"direction", {beam.d_B.x(), beam.d_B.y(), beam.d_B.z()}}});
+      json["beams"].push_back({{"name", beam.name}, {"origin", {beam.p_BL.x(), beam.p_BL.y(), beam.p_BL.z()}}});
     }
   }
   return json;

@@ -185,17 +185,29 @@ TEST_CASE("ekf: inflated motion is about the body, inflated biases are each sens
   CHECK(after(err::b_a, err::b_a) == doctest::Approx(before(err::b_a, err::b_a) + 0.25));
 }
 
-TEST_CASE("ekf: what updates did to the biases is given once, and apart for images") {
+TEST_CASE("ekf: what updates did to the biases is given once") {
   Ekf ekf = started();
   Eigen::MatrixXd H = Eigen::MatrixXd::Zero(1, err::clones);
   H(0, err::b_g + 1) = 10.0;
-  ekf.apply(H, 0, Eigen::VectorXd::Constant(1, 1.0), CameraUpdate::learned, true);
-  ekf.apply(H, 0, Eigen::VectorXd::Constant(1, 1.0), CameraUpdate::learned, false);
-  BiasChanges changes = ekf.take_bias_changes();
-  CHECK(changes.all.correction(1) == doctest::Approx(ekf.state().imu.b_g.y()));
-  CHECK(changes.by_images.correction(1) < changes.all.correction(1));
-  CHECK(changes.all.variance_lowered(1) == doctest::Approx(0.01 - ekf.covariance().matrix()(10, 10)));
-  CHECK(ekf.take_bias_changes().all.correction.isZero());
+  ekf.apply(H, 0, Eigen::VectorXd::Constant(1, 1.0), CameraUpdate::learned);
+  ekf.apply(H, 0, Eigen::VectorXd::Constant(1, 1.0), CameraUpdate::learned);
+  const BiasChanges changes = ekf.take_bias_changes();
+  CHECK(changes.correction(1) == doctest::Approx(ekf.state().imu.b_g.y()));
+  CHECK(changes.variance_lowered(1) == doctest::Approx(0.01 - ekf.covariance().matrix()(10, 10)));
+  CHECK(ekf.take_bias_changes().correction.isZero());
   ekf.discard_bias_changes();
   CHECK(ekf.take_bias_changes().restarted);
+}
+
+TEST_CASE("ekf: at the start both wheels are known apart better than alike") {
+  FilterConfig config;
+  Ekf ekf(config, vehicle());
+  Eigen::VectorXd sigma = Eigen::VectorXd::Zero(err::clones);
+  sigma.segment<2>(err::wheel_radius).setConstant(config.prior.wheel_radius);
+  ekf.start(ImuState{}, sigma);
+  const Eigen::Matrix2d P = ekf.covariance().matrix().block<2, 2>(err::wheel_radius, err::wheel_radius);
+  const Eigen::RowVector2d apart(1.0, -1.0), mean(0.5, 0.5);
+  CHECK(std::sqrt((apart * P * apart.transpose()).value()) < std::sqrt(2.0) * config.prior.wheel_apart);
+  CHECK(std::sqrt((mean * P * mean.transpose()).value()) ==
+        doctest::Approx(config.prior.wheel_radius / std::sqrt(2.0)).epsilon(0.01));
 }

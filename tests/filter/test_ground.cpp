@@ -27,8 +27,6 @@ State on_plane(const Eigen::Vector3d& n_W, const Eigen::Matrix3d& R_WB) {
   x.ground.n_W = n_W.normalized();
   x.odometer.wheel_radius.setConstant(0.075);
   x.odometer.T_BO.p = {-0.02, 0.0, -0.05};
-  const auto beams = three_beams();
-  for (std::size_t i = 0; i < 3; ++i) x.odometer.d_B[i] = beams[i].d_B;
   return x;
 }
 
@@ -37,13 +35,13 @@ State on_plane(const Eigen::Vector3d& n_W, const Eigen::Matrix3d& R_WB) {
 TEST_CASE("ground: on a level floor a beam straight down measures its height above it") {
   const State x = on_plane(Eigen::Vector3d::UnitZ(), Eigen::Matrix3d::Identity());
   // The floor is 0.075 below O, which is 0.05 below the body; the beam starts 0.03 below the body.
-  CHECK(predict_range(x, x.imu.R_WB, 0, three_beams()[0].p_BL).range == doctest::Approx(0.095));
+  CHECK(predict_range(x, x.imu.R_WB, three_beams()[0], 0.0).range == doctest::Approx(0.095));
 }
 
 TEST_CASE("ground: nose-down brings the ground closer to the front beams") {
   const State x = on_plane(Eigen::Vector3d::UnitZ(), exp_so3({0.0, 0.1, 0.0}));
-  CHECK(predict_range(x, x.imu.R_WB, 0, three_beams()[0].p_BL).range < 0.095 - 0.005);
-  CHECK(predict_range(x, x.imu.R_WB, 2, three_beams()[2].p_BL).range > 0.105 + 0.005);
+  CHECK(predict_range(x, x.imu.R_WB, three_beams()[0], 0.0).range < 0.095 - 0.005);
+  CHECK(predict_range(x, x.imu.R_WB, three_beams()[2], 0.0).range > 0.105 + 0.005);
 }
 
 TEST_CASE("ground: the axle of a vehicle that stands on its right wheel leans to the left of the ground") {
@@ -62,7 +60,7 @@ TEST_CASE("ground: the plane through the predicted hits is the plane") {
     const auto beams = three_beams();
     Eigen::Vector3d range;
     for (std::size_t k = 0; k < 3; ++k) {
-      range(static_cast<Eigen::Index>(k)) = predict_range(x, x.imu.R_WB, k, beams[k].p_BL).range;
+      range(static_cast<Eigen::Index>(k)) = predict_range(x, x.imu.R_WB, beams[k], 0.0).range;
     }
     const auto plane = plane_through_hits(beams, range, x.odometer.T_BO.p);
     REQUIRE(plane);
@@ -119,18 +117,21 @@ TEST_CASE("ground: Jacobians are the derivatives") {
   std::mt19937_64 rng{62};
   for (int i = 0; i < 5; ++i) {
     const State x = random_state(rng, 0);
-    const Eigen::Vector3d p_BL = random_vector(rng, 0.1);
-    for (std::size_t beam = 0; beam < kMaxBeams; ++beam) {
-      const BeamPrediction z = predict_range(x, x.imu.R_WB, beam, p_BL);
+    const LaserBeam laser{"", random_vector(rng, 0.1),
+                          (-Eigen::Vector3d::UnitZ() + random_vector(rng, 0.2)).normalized()};
+    for (int beam = 0; beam < kMaxBeams; ++beam) {
+      const BeamPrediction z = predict_range(x, x.imu.R_WB, laser, x.odometer.beam_offset(beam));
       Eigen::MatrixXd H = Eigen::MatrixXd::Zero(1, err::camera);
       H.block<1, 2>(0, err::normal) = z.H_normal;
-      H(0, err::beams + static_cast<int>(beam)) = z.H_tilt;
+      H.block<1, 3>(0, err::axle) = z.H_axle;
+      H(0, err::beams + beam) = 1.0;
       const auto range = [&](const Eigen::VectorXd& part) -> Eigen::VectorXd {
         Eigen::VectorXd d = Eigen::VectorXd::Zero(x.error_size());
         d.head(part.size()) = part;
         d.segment<2>(err::wheel_radius).setZero();
         const State moved = boxplus(x, d);
-        return Eigen::VectorXd::Constant(1, predict_range(moved, moved.imu.R_WB, beam, p_BL).range);
+        return Eigen::VectorXd::Constant(
+            1, predict_range(moved, moved.imu.R_WB, laser, moved.odometer.beam_offset(beam)).range);
       };
       check_jacobian(range, H);
     }

@@ -86,10 +86,10 @@ TEST_CASE("wheels: the wheel that rolls and the gyroscope tell the speed when th
   const double left = 0.5 - 0.5 * kTrackWidth * rate, right = 0.5 + 0.5 * kTrackWidth * rate;
   WheelRows rows = rows_of(x, rims(0.0, right), {0.0, 0.0, rate});
   CHECK(std::abs(rows.residual(WheelRows::speed)) > 0.1);
-  rows.take_one_wheel(0.5 * kTrackWidth);
+  rows.measure_at(0.5 * kTrackWidth);
   CHECK(std::abs(rows.residual(WheelRows::speed)) < 1e-12);
   rows = rows_of(x, rims(left, 0.0), {0.0, 0.0, rate});
-  rows.take_one_wheel(-0.5 * kTrackWidth);
+  rows.measure_at(-0.5 * kTrackWidth);
   CHECK(std::abs(rows.residual(WheelRows::speed)) < 1e-12);
 }
 
@@ -100,7 +100,7 @@ TEST_CASE("wheels: the Jacobian of one wheel is the derivative, and knows nothin
   const Eigen::Vector3d gyro_B = random_vector(rng, 0.5);
   const double lever = 0.5 * x.odometer.track_width;
   WheelRows rows = rows_of(x, turn, gyro_B, OdometerModel::gyro);
-  rows.take_one_wheel(lever);
+  rows.measure_at(lever);
   const auto prediction = [&](const Eigen::VectorXd& part) -> Eigen::VectorXd {
     Eigen::VectorXd d = Eigen::VectorXd::Zero(x.error_size());
     d.head(part.size()) = part;

@@ -102,7 +102,6 @@ TEST_CASE("allocations: none with every model of the odometer and every update")
   }
   FilterConfig config;
   config.anomaly.enabled = true;
-  config.online_calibration.beam_tilt = true;
   check(run(slope, config));
 }
 

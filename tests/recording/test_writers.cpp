@@ -148,7 +148,7 @@ TEST_CASE("summary: all that online calibration moves") {
   learned.encoder->T_BO.translation() << 0.0, 0.0, -0.05;
   learned.encoder->wheel_radius = {0.0751, 0.0749};
   learned.lasers = LaserCalibration{};
-  learned.lasers->beams = {{"rear", {0.0, 0.0, 0.0}, {0.6, 0.0, -0.8}}};
+  learned.lasers->beams = {{"rear", {0.1, 0.0, -0.02}, {0.6, 0.0, -0.8}}};
   const auto json = written(learned);
   const auto pose = [&](const char* name) { return json[name].get<std::vector<double>>(); };
   CHECK(pose("T_BC0") == std::vector<double>{0, 0, 1, 0.1, -1, 0, 0, 0.05, 0, -1, 0, 0, 0, 0, 0, 1});
@@ -161,7 +161,7 @@ TEST_CASE("summary: all that online calibration moves") {
   CHECK(json["wheel_radius_right"] == 0.0749);
   CHECK(json["track_width"] == 0.4);
   CHECK(json["beams"][0]["name"] == "rear");
-  CHECK(json["beams"][0]["direction"] == std::vector<double>{0.6, 0.0, -0.8});
+  CHECK(json["beams"][0]["origin"] == std::vector<double>{0.1, 0.0, -0.02});
 }
 
 TEST_CASE("writers: a file that cannot be created is an error that names it") {

@@ -41,9 +41,7 @@ inline State random_state(std::mt19937_64& rng, int clones) {
   x.odometer.wheel_radius = {0.075, 0.0748};
   x.odometer.track_width = 0.4;
   x.odometer.T_BO = random_pose(rng, 0.05, 0.03);
-  for (Eigen::Vector3d& d_B : x.odometer.d_B) {
-    d_B = (-Eigen::Vector3d::UnitZ() + random_vector(rng, 0.2)).normalized();
-  }
+  x.odometer.beam_offset = random_vector(rng, 0.01);
   x.camera = random_cameras(rng);
   for (int i = 0; i < clones; ++i) {
     x.clones.push_back(

@@ -15,6 +15,8 @@ constexpr double kBridgePosition = 5e-3;  // [m] well above what the features wi
 constexpr int kBridgeRows = 6;
 constexpr double kApparent = 3.0;          // standard deviations of the cameras' calibration that look like a turn
 constexpr double kOldImage = 0.5;          // [s] chosen: after which frames have little in common
+constexpr double kRecent = 0.3;            // [s] chosen: an image shows the motion for so long
+constexpr std::size_t kFewFeatures = 10;   // chosen: fewer show too little of the motion, as for health
 constexpr double kNoisy = 1.25;            // chosen: times the usual noise of a feature; less may be chance
 constexpr std::size_t kMaxCompared = 512;  // features of a frame whose motion is compared with other sensors
 
@@ -87,7 +89,7 @@ bool Cameras::bridge(const FeatureFrame& frame, Ekf& ekf) {
   H.bottomRightCorner<3, err::clone_size>() = llt.matrixL().solve(rows.H_clone.bottomRows<3>());
   Eigen::Matrix<double, kBridgeRows, 1> r;
   r << rows.residual.head<3>() / kBridgeRotation, llt.matrixL().solve(rows.residual.tail<3>());
-  ekf.apply(H, 0, r, CameraUpdate::considered, true);
+  ekf.apply(H, 0, r, CameraUpdate::considered);
   return true;
 }
 
@@ -149,6 +151,11 @@ void Cameras::remember(const FeatureFrame& frame, const Ekf& ekf) {
   const Eigen::Matrix3d R_BW = clone.T_WB.R.transpose();
   last_->clone = clone.frame;
   last_->in_clone = {R_BW * x.imu.R_WB, R_BW * (x.imu.p_WB - clone.T_WB.p)};
+}
+
+bool Cameras::show_motion(const State& x) const {
+  return last_ && last_features_.features.size() >= kFewFeatures &&
+         seconds_between(imu_time(last_->t_ns, x.camera), x.imu.t_ns) < kRecent;
 }
 
 void Cameras::reset() {

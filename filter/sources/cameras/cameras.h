@@ -56,6 +56,8 @@ class Cameras {
   /// The body's pose joins the window, without an image.
   void clone_without_image(double weight, Ekf& ekf);
   /// The state is as well known as if features had updated it.
+  /// Did an image with features enough come not long ago?
+  [[nodiscard]] bool show_motion(const State& x) const;
   void set_updated(TimeNs t_ns) { window_.set_updated(t_ns); }
 
   /// The frame was used; the next one is compared with it.
@@ -84,7 +86,7 @@ class Cameras {
   FrameCheck frame_check_;
   StereoMatches matches_;
   CameraDisplacement displacement_;
-  TimeNs compared_ns_ = 0;  ///< where the last interval of displacement() ended
+  TimeNs compared_ns_ = 0;         ///< where the last interval of displacement() ended
   std::optional<LastImage> last_;
   FeatureFrame last_features_;
   Eigen::MatrixXd rows_;  // memory that is used again

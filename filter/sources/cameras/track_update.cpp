@@ -45,7 +45,7 @@ void TrackUpdate::update(const FeatureFrame& frame, bool oldest_goes, CameraUpda
   log(ekf, records);
   information_.compress(kNegligible);
   if (information_.residual().size() > 0) {
-    ekf.apply(information_.H(), err::camera, information_.residual(), calibration, true);
+    ekf.apply(information_.H(), err::camera, information_.residual(), calibration);
   }
   // Features that ended, used or not, are forgotten.
   tracks.keep_if([&](const Track& track) { return !track.observations.empty() && continues(track.id); });

@@ -53,9 +53,11 @@ void Ground::update(const BeamRanges& reading, const ImuBuffer& imu, CameraUpdat
   for (std::size_t beam = 0; beam < lasers_->beams.size(); ++beam) {
     const double range = reading.range[beam];
     if (!(range >= lasers_->range_min && range <= lasers_->range_max)) continue;
-    const BeamPrediction predicted = predict_range(x, R_WB, beam, lasers_->beams[beam].p_BL);
+    const BeamPrediction predicted =
+        predict_range(x, R_WB, lasers_->beams[beam], x.odometer.beam_offset(static_cast<int>(beam)));
     z.H.row(z.count).segment<2>(ground_column(err::normal)) = predicted.H_normal;
-    z.H(z.count, ground_column(err::beams) + static_cast<int>(beam)) = predicted.H_tilt;
+    z.H.row(z.count).segment<3>(ground_column(err::axle)) = predicted.H_axle;
+    z.H(z.count, ground_column(err::beams) + static_cast<int>(beam)) = 1.0;
     z.residual(z.count) = range - predicted.range;
     z.sigma(z.count) = std::hypot(lasers_->noise, config_.unevenness);
     beam_of[static_cast<std::size_t>(z.count++)] = beam_source(beam);

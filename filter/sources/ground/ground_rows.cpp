@@ -60,19 +60,18 @@ Eigen::Matrix<double, 3, 2> normal_by_error(const State& x, const Eigen::Matrix3
 }
 }  // namespace
 
-BeamPrediction predict_range(const State& x, const Eigen::Matrix3d& R_WB, std::size_t beam,
-                             const Eigen::Vector3d& p_BL) {
+BeamPrediction predict_range(const State& x, const Eigen::Matrix3d& R_WB, const LaserBeam& beam, double offset) {
   const Eigen::Vector3d n_B = R_WB.transpose() * x.ground.n_W;
-  const Eigen::Vector3d& d_B = x.odometer.d_B[beam];
-  const Eigen::Vector3d from_O = p_BL - x.odometer.T_BO.p;
+  const Eigen::Vector3d& d_B = beam.d_B;
+  const Eigen::Vector3d from_O = beam.p_BL - x.odometer.T_BO.p;
   const double slant = n_B.dot(d_B);  // negative: the beam goes down
   BeamPrediction z;
   z.range = -(x.odometer.wheel_radius.mean() + n_B.dot(from_O)) / slant;
 
   const Eigen::RowVector3d J_n = -(from_O + z.range * d_B).transpose() / slant;
   z.H_normal = J_n * normal_by_error(x, R_WB, n_B);
-  const Eigen::Vector3d axis = tilt_axis(d_B, x.odometer.T_BO.R.col(2));
-  z.H_tilt = -z.range / slant * n_B.dot(axis.cross(d_B));
+  z.H_axle = n_B.transpose() / slant;
+  z.range += offset;
   return z;
 }
 

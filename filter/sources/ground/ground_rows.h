@@ -32,19 +32,20 @@ struct Slope {
 /// For a vehicle whose axle points to y_W (left) on ground of normal n_W, both unit.
 [[nodiscard]] Slope slope(const Eigen::Vector3d& y_W, const Eigen::Vector3d& n_W);
 
-/// A beam's range on the ground at contact, linearized: range = predicted + H_normal delta + H_tilt tilt. The body's
-/// attitude does not appear: the normal's error is counted from it. Nor does the wheels' radius: the ground's
+/// A beam's range on the ground at contact, linearized: range = predicted + H_normal delta + H_axle dp + offset. The
+/// body's attitude does not appear: the normal's error is counted from it. Nor does the wheels' radius: the ground's
 /// unevenness at the beams is not white, and must not be taken for an error of the radius.
 struct BeamPrediction {
   double range = 0.0;  ///< [m]; not positive, or not finite, if the beam does not meet the ground
   Eigen::RowVector2d H_normal = Eigen::RowVector2d::Zero();
-  double H_tilt = 0.0;
+  Eigen::RowVector3d H_axle = Eigen::RowVector3d::Zero();
 };
 
-/// Range of `beam`, which starts at p_BL, when the ground's plane passes the mean wheel radius below O:
-///   range = -(r + n_B . (p_BL - p_BO)) / (n_B . d_B)
-[[nodiscard]] BeamPrediction predict_range(const State& x, const Eigen::Matrix3d& R_WB, std::size_t beam,
-                                           const Eigen::Vector3d& p_BL);
+/// Range of a beam whose readings are `offset` too long [m], when the ground's plane passes the mean wheel radius below
+/// O:
+///   range = -(r + n_B . (p_BL - p_BO)) / (n_B . d_B) + offset
+[[nodiscard]] BeamPrediction predict_range(const State& x, const Eigen::Matrix3d& R_WB, const LaserBeam& beam,
+                                           double offset);
 
 /// Both wheels stand on the ground, so the axle lies along it: 0 = lean + H_normal delta, lean = y_B . n_B.
 struct AxlePrediction {

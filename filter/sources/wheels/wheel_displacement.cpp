@@ -56,6 +56,7 @@ Displacement wheel_displacement(const State& x, const Covariance& P, const Wheel
   H.middleCols<3>(err::b_g) = z.J_alpha_bias + skew(z.R_BiBj * odometer.T_BO.p) * z.J_xi_bias;
   H.middleCols<2>(err::wheel_radius) = z.J_alpha_radius;
   H.col(err::track_width) = z.J_alpha_track_width;
+  H.middleCols<3>(err::axle) = Eigen::Matrix3d::Identity() - z.R_BiBj;
   H.middleCols<3>(err::odometer) = -z.J_alpha_axle * odometer.T_BO.R * skew(Eigen::Vector3d::UnitY());
   if (setting.on_plane) {
     H.middleCols<2>(err::normal) = -z.J_alpha_normal * skew(n_B) * R_BW * tangent_basis(x.ground.n_W);

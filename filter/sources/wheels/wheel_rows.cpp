@@ -5,7 +5,7 @@
 
 namespace ear {
 
-void WheelRows::take_one_wheel(double lever) {
+void WheelRows::measure_at(double lever) {
   residual(speed) += lever * residual(yaw_rate);
   H.row(speed) += lever * H.row(yaw_rate);
   H(speed, ground_column(err::track_width)) -= lever * residual(yaw_rate);  // the lever grows with it
@@ -37,7 +37,7 @@ WheelRows linearize_wheels(const State& x, const Eigen::Matrix3d& R_WB, const Ei
   // Derivatives of y, n, f by the state's errors.
   constexpr int nu = ground_column(err::nu), b_g = ground_column(err::b_g), normal = ground_column(err::normal);
   constexpr int radius = ground_column(err::wheel_radius), track_width = ground_column(err::track_width);
-  constexpr int phi = ground_column(err::odometer);
+  constexpr int phi = ground_column(err::odometer), axle = ground_column(err::axle);
   const Eigen::Matrix3d y_phi = -R_BO * skew(Vector3d::UnitY());
   Eigen::Matrix3d n_phi = Eigen::Matrix3d::Zero();
   Eigen::Matrix<double, 3, 2> n_delta = Eigen::Matrix<double, 3, 2>::Zero();
@@ -61,6 +61,7 @@ WheelRows linearize_wheels(const State& x, const Eigen::Matrix3d& R_WB, const Ei
   auto& H = rows.H;
   H.middleCols<3>(nu).topRows<3>() = direction * R_WB.transpose();
   H.middleCols<3>(b_g) = -rows.J_gyro;
+  H.middleCols<3>(axle).topRows<3>() = direction * skew(rate);
   H.block<1, 3>(WheelRows::speed, phi) = v_O.transpose() * f_phi;
   H.block<1, 3>(WheelRows::side, phi) = v_O.transpose() * y_phi;
   H.block<1, 3>(WheelRows::slope, phi) = v_O.transpose() * n_phi;

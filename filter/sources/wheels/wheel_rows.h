@@ -23,9 +23,9 @@ struct WheelRows {
   Eigen::Matrix<double, size, 3> J_gyro;  ///< of the prediction by the measured rate
   double wheel_speed = 0.0;               ///< forward speed that the wheels measure [m/s]
 
-  /// In place of the mean of both wheels, one of them and the gyroscope's yaw rate give the speed. `lever`: where it
-  /// stands on the axle, half the track width; negative for the left one [m].
-  void take_one_wheel(double lever);
+  /// In place of the axle's middle, the speed is measured at this place on the axle, by the wheels and the gyroscope's
+  /// yaw rate. `lever` [m]: half the track width is the right wheel alone, minus that the left one.
+  void measure_at(double lever);
 };
 
 /// The odometer's rows at a state that is `v_W` and `R_WB` at the middle of the turn; `gyro_B`: mean measured rate over

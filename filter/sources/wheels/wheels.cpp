@@ -9,8 +9,7 @@
 namespace ear {
 namespace {
 
-constexpr double kErrorTime = 0.5;  // [s] chosen: the contradiction of two wheels is one error for so long
-constexpr double kLifting = 0.3;    // [s] chosen: after wheels that leave the ground, or meet it, as it seems
+constexpr double kLifting = 0.3;  // [s] chosen: after wheels that leave the ground, or meet it, as it seems
 
 }  // namespace
 
@@ -23,33 +22,34 @@ void Wheels::update(const WheelIncrement& increment, const Context& context, Ekf
   const MeanRate rate = context.imu.mean_rate(increment.from_ns, increment.to_ns);
   WheelRows rows = linearize_wheels(x, motion.R_WB, motion.v_W, increment, rate.gyro_B, config_.model, sees_ground_);
   Sigmas sigma = noise_of(rows, increment, rate, x);
-  log(rows, sigma, increment.to_ns, ekf, records.log);
+  score_wheels(rows, sigma, increment.to_ns, context.supported, ekf, records);
 
   // Without lasers, roll and the gyroscope's bias are set apart by nothing else: both turn the path sideways.
   const bool terrain = config_.model == OdometerModel::terrain;
   const bool use_yaw_rate =
       config_.model == OdometerModel::differential || config_.yaw_rate || (terrain && !sees_ground_);
-  const bool slope_known = !uses_plane() || context.ground_known;
-  const bool speed_known = choose_wheel(rows, sigma, increment, ekf, records.statistics);
-  const std::array<bool, WheelRows::size> use = {speed_known, true, slope_known,
-                                                 use_yaw_rate && running_.agreement.agree()};
+  const std::array<bool, WheelRows::size> use = {true, true, !uses_plane() || context.ground_known, use_yaw_rate};
   GroundRows<WheelRows::size> z;
-  std::array<int, WheelRows::size> row_of{};
   for (int row = 0; row < WheelRows::size; ++row) {
     if (!use[static_cast<std::size_t>(row)]) continue;
+    if (row != WheelRows::speed) {
+      const Innovation innovation = ekf.test(rows.H.row(row), rows.residual(row), sigma(row));
+      if (row == WheelRows::slope && !innovation.fits) running_.lifted_ns = increment.to_ns;
+      NoiseScore& score = running_.row[static_cast<std::size_t>(row)];
+      const double noise = sigma(row) * sigma(row);
+      sigma(row) *= std::sqrt(
+          score.add(innovation.value, {innovation.variance - noise, noise, context.supported}, increment.to_ns));
+      count(score, records.statistics);
+    }
     z.H.row(z.count) = rows.H.row(row);
     z.residual(z.count) = rows.residual(row);
-    z.sigma(z.count) = sigma(row);
-    row_of[static_cast<std::size_t>(z.count++)] = row;
+    z.sigma(z.count++) = sigma(row);
   }
-  ekf.apply(z, context.weight, context.calibration, [&](int i, const Innovation& innovation) {
-    const int row = row_of[static_cast<std::size_t>(i)];
-    if (row == WheelRows::slope && !innovation.fits) running_.lifted_ns = increment.to_ns;
-    const bool used =
-        agrees_again(running_.agrees_since_ns[static_cast<std::size_t>(row)], innovation.fits, increment.to_ns);
-    ++(used ? records.statistics.wheel_rows_used : records.statistics.wheel_rows_rejected);
-    return used;
-  });
+  ekf.apply(z, context.weight, context.calibration, [](int, const Innovation&) { return true; });
+}
+
+void Wheels::count(const NoiseScore& score, FrameStatistics& statistics) {
+  ++(score.fits() ? statistics.wheel_rows_used : statistics.wheel_rows_rejected);
 }
 
 /// What slips or bumps is white in the distance; the counts and the gyroscope add their own.
@@ -80,53 +80,31 @@ Wheels::Sigmas Wheels::noise_of(const WheelRows& rows, const WheelIncrement& inc
   return sigma;
 }
 
-/// Where the wheels contradict each other by the gyroscope, the one that agrees with the state gives the speed. False
-/// if none does. If both do, it lies somewhere between them.
-bool Wheels::choose_wheel(WheelRows& rows, Sigmas& sigma, const WheelIncrement& increment, const Ekf& ekf,
-                          FrameStatistics& statistics) {
+/// Each wheel by itself: the axle's speed and yaw rate predict how fast it should roll. Where the speed is measured
+/// moves along the axle to the wheel that fits better, and its noise grows with what both have.
+void Wheels::score_wheels(WheelRows& rows, Sigmas& sigma, TimeNs t_ns, bool supported, const Ekf& ekf,
+                          Records& records) {
   const double half = 0.5 * ekf.state().odometer.track_width;
-  WheelAgreement& agreement = running_.agreement;
-  const bool agreed = agreement.agree();
-  agreement.add(2.0 * half * rows.residual(WheelRows::yaw_rate),
-                2.0 * half * std::sqrt(ekf.covariance().variance(rows.H.row(WheelRows::yaw_rate), err::nu)),
-                increment.to_ns);
-  if (agreement.agree()) return true;
-  if (agreed) running_.wheel_agrees_since_ns.fill(kDisagrees);  // the state may have followed the wrong one a little
-
-  const double sigma_one = std::hypot(sigma(WheelRows::speed), half * sigma(WheelRows::yaw_rate));
-  std::array<WheelRows, 2> one = {rows, rows};
-  std::array<bool, 2> fits{};
-  for (std::size_t wheel = 0; wheel < 2; ++wheel) {
-    one[wheel].take_one_wheel(wheel == 0 ? -half : half);
-    const Innovation innovation =
-        ekf.test(one[wheel].H.row(WheelRows::speed), one[wheel].residual(WheelRows::speed), sigma_one);
-    fits[wheel] = agrees_again(running_.wheel_agrees_since_ns[wheel], innovation.fits, increment.to_ns);
-  }
-  if (fits[0] && fits[1]) {
-    const double between = 0.5 * agreement.difference() * std::sqrt(kErrorTime / increment.duration());
-    sigma(WheelRows::speed) = std::hypot(sigma(WheelRows::speed), between);
-    return true;
-  }
-  if (!fits[0] && !fits[1]) {
-    ++statistics.wheel_rows_rejected;
-    return false;
-  }
-  rows = one[fits[0] ? 0 : 1];
-  sigma(WheelRows::speed) = sigma_one;
-  return true;
-}
-
-/// Each wheel by itself: the axle's speed and yaw rate predict how fast it should roll.
-void Wheels::log(const WheelRows& rows, const Sigmas& sigma, TimeNs t_ns, const Ekf& ekf, InnovationLog& log) const {
-  const double lever = 0.5 * ekf.state().odometer.track_width;
-  for (const Source wheel : {Source::wheel_left, Source::wheel_right}) {
-    const double side = wheel == Source::wheel_left ? -lever : lever;
+  const double noise = std::hypot(sigma(WheelRows::speed), half * sigma(WheelRows::yaw_rate));
+  std::array<double, 2> information{};
+  for (std::size_t i = 0; i < 2; ++i) {
+    const double side = i == 0 ? -half : half;
     const Eigen::Matrix<double, 1, kGroundColumns> H =
         rows.H.row(WheelRows::speed) + side * rows.H.row(WheelRows::yaw_rate);
-    const double noise = std::hypot(sigma(WheelRows::speed), side * sigma(WheelRows::yaw_rate));
-    const double innovation = rows.residual(WheelRows::speed) + side * rows.residual(WheelRows::yaw_rate);
-    log.add(wheel, ekf.test(H, innovation, noise), t_ns);
+    Innovation innovation =
+        ekf.test(H, rows.residual(WheelRows::speed) + side * rows.residual(WheelRows::yaw_rate), noise);
+    NoiseScore& score = running_.wheel[i];
+    information[i] =
+        1.0 / score.add(innovation.value, {innovation.variance - noise * noise, noise * noise, supported}, t_ns);
+    innovation.fits = score.fits();
+    records.log.add(i == 0 ? Source::wheel_left : Source::wheel_right, innovation, t_ns);
+    count(score, records.statistics);
   }
+  const double sum = information[0] + information[1];
+  const double lever = half * (information[1] - information[0]) / sum;
+  rows.measure_at(lever);
+  sigma(WheelRows::speed) =
+      std::hypot(sigma(WheelRows::speed), lever * sigma(WheelRows::yaw_rate)) * std::sqrt(2.0 / sum);
 }
 
 Displacement Wheels::displacement(const Ekf& ekf, const WheelIncrements& increments, const ImuBuffer& imu, TimeNs to_ns,

@@ -9,9 +9,9 @@
 #include "ear/filter_config.h"
 #include "filter/ekf/displacement.h"
 #include "filter/ekf/ekf.h"
+#include "filter/ekf/noise_score.h"
 #include "filter/ekf/records.h"
 #include "filter/ingest/imu_buffer.h"
-#include "filter/sources/wheels/wheel_agreement.h"
 #include "filter/sources/wheels/wheel_rows.h"
 
 namespace ear {
@@ -26,6 +26,7 @@ class Wheels {
     const ImuBuffer& imu;
     bool ground_known = false;  ///< the lasers have seen the ground since it was last touched
     double weight = 1.0;        ///< (15)
+    bool supported = false;     ///< images show how the vehicle moves too
     CameraUpdate calibration = CameraUpdate::considered;
   };
   /// The filter's state is near the middle of the increment.
@@ -47,16 +48,14 @@ class Wheels {
   [[nodiscard]] bool uses_plane() const { return config_.model == OdometerModel::terrain && sees_ground_; }
   [[nodiscard]] Sigmas noise_of(const WheelRows& rows, const WheelIncrement& increment, const MeanRate& rate,
                                 const State& x) const;
-  void log(const WheelRows& rows, const Sigmas& sigma, TimeNs t_ns, const Ekf& ekf, InnovationLog& log) const;
-  [[nodiscard]] bool choose_wheel(WheelRows& rows, Sigmas& sigma, const WheelIncrement& increment, const Ekf& ekf,
-                                  FrameStatistics& statistics);
+  void score_wheels(WheelRows& rows, Sigmas& sigma, TimeNs t_ns, bool supported, const Ekf& ekf, Records& records);
+  static void count(const NoiseScore& score, FrameStatistics& statistics);
 
   /// What the last increments have shown.
   struct Running {
-    std::array<TimeNs, WheelRows::size> agrees_since_ns{};  ///< each row with the state; kDisagrees
-    std::array<TimeNs, 2> wheel_agrees_since_ns{};  ///< each wheel by itself with the state, while they contradict
-    WheelAgreement agreement;
-    std::optional<TimeNs> lifted_ns;  ///< when the velocity last did not lie in the ground
+    std::array<NoiseScore, 2> wheel;              ///< left, right
+    std::array<NoiseScore, WheelRows::size> row;  ///< of all but the speed, which is the wheels'
+    std::optional<TimeNs> lifted_ns;              ///< when the velocity last did not lie in the ground
   };
 
   OdometerConfig config_;

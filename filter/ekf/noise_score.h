@@ -1,0 +1,42 @@
+// The score of one sensor, from how its innovations have fitted over the last moments: its noise is divided by it at
+// every update. Variational noise adaptation (Sarkka and Nummenmaa 2009): the factor on the noise's variance has an
+// inverse-gamma belief, whose mean follows the innovations. One that is far off raises it before it is used, which is
+// a Student-t update; many raise it for all. It forgets in seconds, whatever the sensor's rate. docs/filter.md,
+// "Wheels".
+#pragma once
+
+#include <optional>
+
+#include "ear/types.h"
+
+namespace ear {
+
+class NoiseScore {
+ public:
+  /// What an innovation is compared with: the variances of its parts.
+  struct Expected {
+    double state = 0.0;      ///< by the state's error
+    double noise = 0.0;      ///< by the sensor's noise, as it usually is
+    bool supported = false;  ///< other sensors show the same part of the state
+  };
+
+  /// A residual at `t_ns`. The factor, at least 1, that the noise's variance is to be multiplied by. What the state
+  /// contradicts weighs less and less: where the state is supported it counts for nothing in the end, by the square of
+  /// the believed factor; where it is not, the state may be what is wrong, and the factor itself leaves a pull that
+  /// brings it back.
+  double add(double residual, const Expected& expected, TimeNs t_ns);
+
+  /// In (0, 1]: 1 over the root of the believed factor.
+  [[nodiscard]] double weight() const;
+  /// Did the last innovations fit, by and large?
+  [[nodiscard]] bool fits() const;
+
+ private:
+  [[nodiscard]] double factor(double square, double count) const;
+
+  double squares_ = 0.0;  ///< of past noises over the usual variance, recent ones
+  double count_ = 0.0;    ///< how many they are
+  std::optional<TimeNs> last_ns_;
+};
+
+}  // namespace ear
