@@ -86,7 +86,7 @@ class Cameras {
   FrameCheck frame_check_;
   StereoMatches matches_;
   CameraDisplacement displacement_;
-  TimeNs compared_ns_ = 0;         ///< where the last interval of displacement() ended
+  TimeNs compared_ns_ = 0;  ///< where the last interval of displacement() ended
   std::optional<LastImage> last_;
   FeatureFrame last_features_;
   Eigen::MatrixXd rows_;  // memory that is used again
