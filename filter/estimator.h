@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "ear/estimate.h"
+#include "ear/given_start.h"
 #include "ear/types.h"
 #include "filter/ekf/state.h"
 
@@ -48,6 +49,7 @@ class Estimator {
  public:
   virtual ~Estimator() = default;
 
+  virtual void start_at(const GivenStart& start) = 0;
   virtual void add_imu(const ImuSample& sample) = 0;
   virtual void add_encoder(const EncoderSample& sample) = 0;
   virtual void add_laser(const LaserSample& sample) = 0;

@@ -1,6 +1,7 @@
 #include "filter/filter.h"
 
 #include <cmath>
+#include <stdexcept>
 #include <utility>
 
 #include "filter/ekf/initial_state.h"
@@ -14,15 +15,25 @@ namespace {
 
 constexpr double kJumpNoticed = 0.3;  // [s] chosen: until a bias that jumped is found out
 
+/// A bias that jumped took the motion along until it was found out. Both are less well known by what was observed.
+void watch_biases(BiasWatch& watch, Ekf& ekf, HealthMonitor& health) {
+  const BiasJump jump = watch.judge(ekf.take_bias_changes(), ekf.state().imu.t_ns);
+  if (!jump.any()) return;
+  ekf.inflate_motion(jump.gyro * kJumpNoticed, jump.accel * kJumpNoticed,
+                     0.5 * jump.accel * kJumpNoticed * kJumpNoticed);
+  ekf.inflate_biases(jump.gyro, jump.accel);
+  health.report_imu_fault(jump.fault.gyro, jump.fault.accel, ekf.state().imu.t_ns);
+}
+
 }  // namespace
 
 Filter::Filter(const FilterConfig& config, const Calibration& calibration)
-    : config_(checked(config)),
-      calibration_(checked(calibration)),
-      ingest_(config, calibration),
-      ekf_(config, calibration),
-      sources_(config, calibration),
-      start_(config, calibration),
+    : config_(settings_for(checked(config), checked(calibration))),
+      calibration_(calibration),
+      ingest_(config_, calibration),
+      ekf_(config_, calibration),
+      sources_(config_, calibration),
+      start_(config_, calibration),
       consistency_check_(config.anomaly),
       health_(calibration, sources_.uses_wheels(), config.odometer.model == OdometerModel::terrain) {}
 
@@ -51,7 +62,7 @@ std::optional<Estimate> Filter::process(const FeatureFrame& given) {
     } else {
       sources_.go_without_image(advice, ekf_, records_);
     }
-    watch_biases();
+    watch_biases(bias_watch_, ekf_, health_);
   }
   if (use_image) sources_.cameras().remember(frame, ekf_);
   return report(true, seen);
@@ -63,7 +74,7 @@ std::optional<Estimate> Filter::process_without_image(TimeNs t_ns) {
   propagate_to(FeatureFrame{t_ns, {}});
   if (ekf_.running()) {
     sources_.go_without_image(advise(consistency_, health_.health(), config_.anomaly), ekf_, records_);
-    watch_biases();
+    watch_biases(bias_watch_, ekf_, health_);
   }
   return report(false, FrameAgreement{});
 }
@@ -85,16 +96,6 @@ void Filter::propagate_to(const FeatureFrame& frame) {
   }
 }
 
-/// A bias that jumped took the motion along until it was found out. Both are less well known by what was observed.
-void Filter::watch_biases() {
-  const BiasJump jump = bias_watch_.judge(ekf_.take_bias_changes(), ekf_.state().imu.t_ns);
-  if (!jump.any()) return;
-  ekf_.inflate_motion(jump.gyro * kJumpNoticed, jump.accel * kJumpNoticed,
-                      0.5 * jump.accel * kJumpNoticed * kJumpNoticed);
-  ekf_.inflate_biases(jump.gyro, jump.accel);
-  health_.report_imu_fault(jump.fault.gyro, jump.fault.accel, ekf_.state().imu.t_ns);
-}
-
 /// What is given away of the state, and whether it is.
 std::optional<Estimate> Filter::report(bool image, const FrameAgreement& agreement) {
   std::optional<Estimate> estimate;
@@ -105,6 +106,7 @@ std::optional<Estimate> Filter::report(bool image, const FrameAgreement& agreeme
   const TimeNs t_ns = imu_time(*last_frame_ns_, ekf_.state().camera);
   HealthMonitor::Frame frame = health_frame(t_ns, ekf_, sources_, agreement, records_, estimate);
   frame.image = image;
+  frame.waits_for = start_.waits_for();
   health_.add_frame(frame, records_.log.records());
   if (frame.running && !frame.possible) stop();
   if (!estimate || !ekf_.running() || !health_.usable()) return std::nullopt;
@@ -114,6 +116,11 @@ std::optional<Estimate> Filter::report(bool image, const FrameAgreement& agreeme
 }
 
 // ---- Starts
+
+void Filter::start_at(const GivenStart& start) {
+  if (status() == Status::tracking) throw std::invalid_argument("start: there is an estimate already");
+  start_.give(checked(start));
+}
 
 /// While lost, the state goes on, and is good again if the cameras come to agree with it. Where they do not, but agree
 /// with the inertial samples, it is the state that is wrong, and begins anew.
@@ -149,6 +156,7 @@ void Filter::restart(TimeNs t_ns, TimeNs clock_shift) {
   Filter fresh(config_, calibration_);
   ingest_.restart();
   fresh.ingest_ = std::move(ingest_);
+  fresh.start_.succeed(start_);
   fresh.health_.succeed(health_, t_ns);
   fresh.alignment_ = alignment_;
   fresh.last_good_ = std::move(last_good_);

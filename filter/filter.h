@@ -32,6 +32,9 @@ class Filter final : public Estimator {
   /// Throws std::invalid_argument, naming the field, if a setting or the calibration is unusable.
   Filter(const FilterConfig& config, const Calibration& calibration);
 
+  /// Begins at a state that is given: see Odometry::start_at.
+  void start_at(const GivenStart& start) override;
+
   /// Takes a sample in time order. One that is not finite, implausible or not later than the one before is refused and
   /// counted. Its stamps are the clock: after a gap of 2 s, or when they go on from an earlier time, all begins anew.
   void add_imu(const ImuSample& sample) override;
@@ -76,7 +79,6 @@ class Filter final : public Estimator {
 
  private:
   void propagate_to(const FeatureFrame& frame);
-  void watch_biases();
   void start(const FeatureFrame& frame);
   void stop();
   void restart(TimeNs t_ns, TimeNs clock_shift);

@@ -44,7 +44,7 @@ void note(ContactEvent event, IntervalMeter& meter, Window* window) {
 }  // namespace
 
 Smoother::Smoother(const FilterConfig& config, const Calibration& calibration)
-    : config_(supported(checked(config), calibration)),
+    : config_(supported(settings_for(checked(config), checked(calibration)), calibration)),
       calibration_(calibration),
       ingest_(config_, calibration),
       ekf_(config_, calibration),
@@ -148,6 +148,7 @@ std::optional<Estimate> Smoother::report(bool image, const FrameAgreement& agree
   const TimeNs t_ns = imu_time(*last_frame_ns_, ekf_.state().camera);
   HealthMonitor::Frame frame = health_frame(t_ns, ekf_, sources_, agreement, records_, estimate);
   frame.image = image;
+  frame.waits_for = start_.waits_for();
   if (estimate && last_good_ && health_.usable()) {
     frame.possible = frame.possible && explained(last_good_->state, estimate->state);
   }
@@ -160,6 +161,11 @@ std::optional<Estimate> Smoother::report(bool image, const FrameAgreement& agree
 }
 
 // ---- Starts
+
+void Smoother::start_at(const GivenStart& start) {
+  if (status() == Status::tracking) throw std::invalid_argument("start: there is an estimate already");
+  start_.give(checked(start));
+}
 
 /// As the filter does. From there on the window has its state and covariance.
 void Smoother::start(const FeatureFrame& frame, TimeNs t_ns) {
@@ -191,6 +197,7 @@ void Smoother::restart(TimeNs t_ns, TimeNs clock_shift) {
   Smoother fresh(config_, calibration_);
   ingest_.restart();
   fresh.ingest_ = std::move(ingest_);
+  fresh.start_.succeed(start_);
   fresh.health_.succeed(health_, t_ns);
   fresh.alignment_ = alignment_;
   fresh.last_good_ = std::move(last_good_);

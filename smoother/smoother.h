@@ -29,6 +29,7 @@ class Smoother final : public Estimator {
   /// cameras, and wheels are used with OdometerModel::terrain and lasers, or not at all.
   Smoother(const FilterConfig& config, const Calibration& calibration);
 
+  void start_at(const GivenStart& start) override;
   void add_imu(const ImuSample& sample) override;
   void add_encoder(const EncoderSample& sample) override;
   void add_laser(const LaserSample& sample) override;

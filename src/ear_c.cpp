@@ -7,9 +7,11 @@
 #include <exception>
 #include <memory>
 #include <new>
+#include <optional>
 #include <stdexcept>
 #include <string>
 
+#include "src/health_text.h"
 #include "src/queued_odometry.h"
 
 struct ear_odometry {  // NOLINT(readability-identifier-naming): named by the C header
@@ -75,6 +77,14 @@ void require_count(int value, int maximum, const char* field) {
   throw std::invalid_argument(std::string(field) + ": 0 to " + std::to_string(maximum));
 }
 
+/// 0 is not known.
+std::optional<double> sigma_of(double from) { return from == 0.0 ? std::nullopt : std::optional(from); }
+
+std::optional<ear::PoseSigma> pose_sigma_of(double rotation, double position) {
+  if (rotation == 0.0 && position == 0.0) return std::nullopt;
+  return ear::PoseSigma{rotation, position};
+}
+
 ear::CameraCalibration camera_of(const ear_camera& from) {
   ear::CameraCalibration camera;
   camera.T_BC = isometry_of(from.T_BC);
@@ -87,6 +97,7 @@ ear::CameraCalibration camera_of(const ear_camera& from) {
   camera.lens = choice<ear::LensModel>(from.lens, 2, "lens");
   std::copy_n(from.distortion, camera.distortion.size(), camera.distortion.begin());
   camera.rate_hz = from.rate_hz;
+  camera.pose_sigma = pose_sigma_of(from.rotation_sigma, from.position_sigma);
   return camera;
 }
 
@@ -99,6 +110,10 @@ ear::EncoderCalibration encoder_of(const ear_calibration& from) {
   encoder.wheel_radius = {from.wheel_radius[0], from.wheel_radius[1]};
   encoder.track_width = from.track_width;
   encoder.noise_counts = from.encoder_noise_counts;
+  encoder.T_BO_sigma = pose_sigma_of(from.odometer_rotation_sigma, from.odometer_position_sigma);
+  encoder.wheel_radius_sigma = sigma_of(from.wheel_radius_sigma);
+  encoder.wheel_radius_difference_sigma = sigma_of(from.wheel_radius_difference_sigma);
+  encoder.track_width_sigma = sigma_of(from.track_width_sigma);
   return encoder;
 }
 
@@ -111,6 +126,7 @@ ear::LaserCalibration lasers_of(const ear_calibration& from) {
   lasers.range_min = from.range_min;
   lasers.range_max = from.range_max;
   lasers.noise = from.laser_noise;
+  lasers.offset_sigma = sigma_of(from.beam_offset_sigma);
   return lasers;
 }
 
@@ -120,8 +136,14 @@ ear::Calibration calibration_of(const ear_calibration& from) {
   ear::Calibration calibration;
   for (int i = 0; i < from.camera_count; ++i) calibration.cameras.push_back(camera_of(from.cameras[i]));
   calibration.camera_time_offset = from.camera_time_offset;
-  calibration.imu = {from.imu_rate_hz, from.gyro_noise, from.gyro_random_walk, from.accel_noise,
-                     from.accel_random_walk};
+  calibration.imu = {from.imu_rate_hz,
+                     from.gyro_noise,
+                     from.gyro_random_walk,
+                     from.accel_noise,
+                     from.accel_random_walk,
+                     sigma_of(from.gyro_bias_sigma),
+                     sigma_of(from.accel_bias_sigma)};
+  calibration.camera_time_offset_sigma = sigma_of(from.camera_time_offset_sigma);
   if (from.has_encoder != 0) calibration.encoder = encoder_of(from);
   if (from.beam_count > 0) calibration.lasers = lasers_of(from);
   return calibration;
@@ -181,6 +203,7 @@ static_assert(EAR_HEALTH_LOST == static_cast<int>(ear::HealthStatus::lost));
 void write_health(const ear::Health& from, ear_health& to) {
   to = {};
   to.status = static_cast<ear_health_status>(from.status);
+  to.reason = static_cast<ear_reason>(from.reason);
   to.since_ns = from.since_ns;
   to.faulty = static_cast<std::uint32_t>(from.faulty.to_ulong());
   std::copy(from.onset_ns.begin(), from.onset_ns.end(), to.onset_ns);
@@ -190,6 +213,23 @@ void write_health(const ear::Health& from, ear_health& to) {
   to.vertical_sigma = from.vertical_sigma;
   to.reset_counter = from.reset_counter;
   to.load_step = from.load_step;
+}
+
+ear::GivenStart start_of(const ear_start& from) {
+  ear::GivenStart start;
+  start.state.t_ns = from.state.t_ns;
+  start.state.q_WB = Eigen::Quaterniond(from.state.q_WB[0], from.state.q_WB[1], from.state.q_WB[2], from.state.q_WB[3]);
+  start.state.p_WB = vector_of(from.state.p_WB);
+  start.state.v_W = vector_of(from.state.v_W);
+  start.state.b_g = vector_of(from.state.b_g);
+  start.state.b_a = vector_of(from.state.b_a);
+  start.tilt_sigma = from.tilt_sigma;
+  start.yaw_sigma = from.yaw_sigma;
+  start.position_sigma = from.position_sigma;
+  start.velocity_sigma = from.velocity_sigma;
+  start.gyro_bias_sigma = sigma_of(from.gyro_bias_sigma);
+  start.accel_bias_sigma = sigma_of(from.accel_bias_sigma);
+  return start;
 }
 
 ear_result result_of(bool queued) { return queued ? EAR_OK : EAR_QUEUE_FULL; }
@@ -309,6 +349,24 @@ ear_result ear_add_stereo(ear_odometry* odometry, const ear_stereo_frame* frame)
   return result_of(odometry->queued.add_stereo(view));
 }
 
+void ear_default_start(ear_start* start) {
+  if (start == nullptr) return;
+  const ear::GivenStart defaults;
+  *start = {};
+  write_state(defaults.state, start->state);
+  start->tilt_sigma = defaults.tilt_sigma;
+  start->velocity_sigma = defaults.velocity_sigma;
+}
+
+ear_result ear_start_at(ear_odometry* odometry, const ear_start* start, char* message, size_t message_size) {
+  const auto give = [&] {
+    if (odometry == nullptr || start == nullptr) throw std::invalid_argument("a pointer is null");
+    odometry->queued.start_at(start_of(*start));
+    return EAR_OK;
+  };
+  return guarded(give, message, message_size);
+}
+
 ear_result ear_process(ear_odometry* odometry, ear_estimate* estimate) {
   return guarded([&] {
     if (odometry == nullptr || estimate == nullptr) return EAR_INVALID_ARGUMENT;
@@ -377,6 +435,12 @@ ear_result ear_health_of(const ear_odometry* odometry, ear_health* health) {
     write_health(odometry->queued.odometry().health(), *health);
     return EAR_OK;
   });
+}
+
+const char* ear_reason_text(ear_reason reason) {
+  return reason < 0 || reason > static_cast<ear_reason>(ear::Reason::clock_or_gap)
+             ? "unknown reason"
+             : ear::to_text(static_cast<ear::Reason>(reason));
 }
 
 const char* ear_source_text(ear_source source) {

@@ -51,8 +51,9 @@ void EventLog::note_unusable(TimeNs t_ns, const std::string& reason) {
 /// A state that was written within the interval waits, so that one that comes and goes does not fill the log; the state
 /// that stays is written in the end.
 void EventLog::note_health(TimeNs t_ns, const Health& health) {
-  const bool same = health.status == written_.status && health.faulty == written_.faulty &&
-                    health.load_step == written_.load_step && health.reset_counter == written_.reset_counter;
+  const bool same = health.status == written_.status && health.reason == written_.reason &&
+                    health.faulty == written_.faulty && health.load_step == written_.load_step &&
+                    health.reset_counter == written_.reset_counter;
   if (same) return;
   const std::string text = to_text(health);
   const auto before = states_.find(text);
@@ -60,7 +61,7 @@ void EventLog::note_health(TimeNs t_ns, const Health& health) {
   states_[text] = t_ns;
   written_ = health;
   if (health.status == HealthStatus::lost) {
-    log_warning(at(t_ns) + "lost: no estimate until it has started again");
+    log_warning(at(t_ns) + text + "; no estimate until it has started again");
   } else {
     log_info(at(t_ns) + text);
   }

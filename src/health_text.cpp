@@ -21,6 +21,50 @@ const char* to_text(Aiding aiding) {
 
 }  // namespace
 
+const char* to_text(Reason reason) {
+  switch (reason) {
+    case Reason::none:
+      return "";
+    case Reason::no_frame:
+      return "no image came, and no step was asked for, that inertial samples reach";
+    case Reason::few_samples:
+      return "inertial samples are missing";
+    case Reason::other_gravity:
+      return "it stands, but the mean specific force is not gravity: another unit, or a broken accelerometer";
+    case Reason::moves_unseen:
+      return "it moves, and neither two cameras nor wheels on the ground show how far";
+    case Reason::few_readings:
+      return "it rolls, and the readings of the wheels do not span 1.5 s yet";
+    case Reason::wheel_gaps:
+      return "it rolls, and readings of the wheels are missing, or more than 0.25 s apart";
+    case Reason::wheels_contradict:
+      return "it rolls, and wheels and inertial samples show different motions";
+    case Reason::few_frames:
+      return "it moves, and frames whose features fit each other do not span 1.5 s yet";
+    case Reason::cameras_contradict:
+      return "it moves, and cameras and inertial samples show different motions";
+    case Reason::slow:
+      return "it moves too slowly for a start in motion, and does not stand";
+    case Reason::start_is_ahead:
+      return "the time of the start that was given has not come";
+    case Reason::start_is_past:
+      return "the inertial samples do not reach back to the time of the start that was given";
+    case Reason::vague_velocity:
+      return "the velocity is not known well enough yet";
+    case Reason::inertia_alone:
+      return "nothing but inertial samples for two seconds";
+    case Reason::velocity_lost:
+      return "the velocity is too uncertain";
+    case Reason::images_contradict:
+      return "the images do not show what the state expects";
+    case Reason::not_a_number:
+      return "the state is not a number";
+    case Reason::clock_or_gap:
+      return "no inertial samples for two seconds, or their clock was set back";
+  }
+  return "";
+}
+
 std::string to_text(HealthStatus status) {
   switch (status) {
     case HealthStatus::initialising:
@@ -38,6 +82,7 @@ std::string to_text(HealthStatus status) {
 std::string to_text(const Health& health) {
   std::string text = to_text(health.status);
   if (health.load_step > 0) text += ", load step " + std::to_string(health.load_step);
+  if (health.reason != Reason::none) return text + ": " + to_text(health.reason);
   if (health.status != HealthStatus::degraded) return text;
   const char* separator = ": without ";
   for (std::size_t source = 0; source < kSourceCount; ++source) {

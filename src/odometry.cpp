@@ -53,6 +53,8 @@ class Odometry::Impl {
   void add_encoder(const EncoderSample& sample) { estimator_->add_encoder(sample); }
   void add_laser(const LaserSample& sample) { estimator_->add_laser(sample); }
 
+  void start_at(const GivenStart& start) { estimator_->start_at(start); }
+
   std::optional<Estimate> add_stereo(const StereoFrame& given) {
     std::optional<Estimate> estimate = process(given);
     events_.note(given.t_ns, health(), input_counts());
@@ -249,6 +251,7 @@ Odometry::~Odometry() = default;
 Odometry::Odometry(Odometry&&) noexcept = default;
 Odometry& Odometry::operator=(Odometry&&) noexcept = default;
 
+void Odometry::start_at(const GivenStart& start) { impl_->start_at(start); }
 void Odometry::add_imu(const ImuSample& sample) { impl_->add_imu(sample); }
 void Odometry::add_encoder(const EncoderSample& sample) { impl_->add_encoder(sample); }
 void Odometry::add_laser(const LaserSample& sample) { impl_->add_laser(sample); }

@@ -66,6 +66,7 @@ class QueuedOdometry {
   /// (PerformanceConfig::budget_ms), frames but the newest are dropped while more than half of the inertial samples'
   /// queue waits.
   Progress process(std::optional<Estimate>& estimate);
+  void start_at(const GivenStart& start) { odometry_.start_at(start); }
   std::optional<Estimate> step(TimeNs t_ns);
   void reset();
 

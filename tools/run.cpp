@@ -18,6 +18,7 @@
 #include "src/recording/config_file.h"
 #include "src/recording/input_error.h"
 #include "src/recording/recording.h"
+#include "src/recording/start_file.h"
 #include "src/recording/writers.h"
 #include "tools/commands.h"
 #include "tools/estimators.h"
@@ -34,6 +35,7 @@ struct RunArguments {
   std::filesystem::path out = "ear-run";
   std::filesystem::path config;
   std::vector<std::filesystem::path> calibration;
+  std::filesystem::path start;
   double camera_rate_hz = 0.0;
   bool mono = false;
   std::optional<OdometerModel> odometer;
@@ -87,18 +89,11 @@ struct Totals {
   }
 };
 
-const char* status_text(Status status) {
-  switch (status) {
-    case Status::waiting_for_imu:
-      return "waiting for inertial samples";
-    case Status::waiting_for_standstill:
-      return "cannot start yet: the vehicle moves, and there are neither two cameras nor wheels that tell how fast";
-    case Status::tracking:
-      return "tracking";
-    case Status::lost:
-      return "lost: waiting to start again";
-  }
-  return "";
+/// Why there is no estimate.
+std::string status_text(const Odometry& odometry) {
+  const char* const reason = to_text(odometry.health().reason);
+  return odometry.status() == Status::lost ? std::string("lost: ") + reason
+                                           : std::string("cannot start yet: ") + reason;
 }
 
 std::string progress_line(const ReplayedFrame& frame, const Odometry& odometry, const TimeSpan& span,
@@ -115,7 +110,7 @@ std::string progress_line(const ReplayedFrame& frame, const Odometry& odometry, 
                   frame.estimate->frame.tracks, frame.estimate->frame.standing ? "standing" : "moving",
                   to_text(frame.estimate->health).c_str());
   } else {
-    std::snprintf(end, rest, "%s", status_text(odometry.status()));
+    std::snprintf(end, rest, "%s", status_text(odometry).c_str());
   }
   return line.data();
 }
@@ -182,6 +177,7 @@ void run(const RunArguments& args) {
     throw InputError(located(args.recording, 0, missing->where, missing->message));
   }
   Odometry odometry = OdometryFactory::make(config, recording.calibration(), estimator_named(args.estimator));
+  if (!args.start.empty()) odometry.start_at(load_start(args.start, recording.span()));
 
   std::filesystem::create_directories(args.out);
   TumWriter trajectory(args.out / "estimate.tum");
@@ -228,7 +224,7 @@ void run(const RunArguments& args) {
     log_warning(warning.kind + ", " + std::to_string(warning.count) + " times, first at " + warning.first);
   }
   if (totals.estimates == 0) {
-    throw InputError(args.recording.string() + ": no estimate: " + status_text(odometry.status()));
+    throw InputError(args.recording.string() + ": no estimate: " + status_text(odometry));
   }
 }
 
@@ -248,6 +244,8 @@ void add_run_command(CLI::App& app) {
   command
       ->add_option("--calibration", args->calibration,
                    "Kalibr's camchain-imucam.yaml and imu.yaml, instead of sensor.yaml")
+      ->check(CLI::ExistingFile);
+  command->add_option("--start", args->start, "Begin with the state in this file (docs/recordings.md)")
       ->check(CLI::ExistingFile);
   command->add_option("--camera-rate", args->camera_rate_hz, "Leave out frames to reach this rate [Hz]")
       ->check(CLI::PositiveNumber);

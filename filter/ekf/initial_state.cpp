@@ -4,6 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "filter/ekf/so3.h"
 
@@ -12,6 +13,35 @@ namespace {
 
 void require(bool condition, const char* what) {
   if (!condition) throw std::invalid_argument(what);
+}
+
+void require_sigma(const std::optional<double>& sigma, const char* what) {
+  require(!sigma || (*sigma > 0.0 && std::isfinite(*sigma)), what);
+}
+
+void require_sigma(const std::optional<PoseSigma>& sigma, const char* what) {
+  if (!sigma) return;
+  require_sigma(sigma->rotation, what);
+  require_sigma(sigma->position, what);
+}
+
+void require_sigmas(const Calibration& calibration) {
+  require_sigma(calibration.camera_time_offset_sigma, "calibration: camera_time_offset_sigma must be positive");
+  for (const CameraCalibration& camera : calibration.cameras) {
+    require_sigma(camera.pose_sigma, "calibration: a camera's pose_sigma must be positive");
+  }
+  require_sigma(calibration.imu.gyro_bias_sigma, "calibration: gyro_bias_sigma must be positive");
+  require_sigma(calibration.imu.accel_bias_sigma, "calibration: accel_bias_sigma must be positive");
+  if (const auto& encoder = calibration.encoder) {
+    require_sigma(encoder->T_BO_sigma, "calibration: T_BO_sigma must be positive");
+    require_sigma(encoder->wheel_radius_sigma, "calibration: wheel_radius_sigma must be positive");
+    require_sigma(encoder->wheel_radius_difference_sigma,
+                  "calibration: wheel_radius_difference_sigma must be positive");
+    require_sigma(encoder->track_width_sigma, "calibration: track_width_sigma must be positive");
+  }
+  if (calibration.lasers) {
+    require_sigma(calibration.lasers->offset_sigma, "calibration: a laser's offset_sigma must be positive");
+  }
 }
 
 }  // namespace
@@ -59,7 +89,47 @@ const Calibration& checked(const Calibration& calibration) {
       require(std::abs(beam.d_B.norm() - 1.0) < 1e-2, "calibration: a laser's direction must have length one");
     }
   }
+  require_sigmas(calibration);
   return calibration;
+}
+
+/// The prior takes both radii for independent, then their difference for known: their mean has 1 / sqrt(2) of the
+/// standard deviation of one.
+FilterConfig settings_for(const FilterConfig& config, const Calibration& calibration) {
+  constexpr double kGapIntervals = 2.5;  // chosen: one sample may be lost, two are a gap
+  FilterConfig result = config;
+  if (calibration.imu.rate_hz > 0.0) {
+    result.max_imu_gap = std::max(config.max_imu_gap, kGapIntervals / calibration.imu.rate_hz);
+  }
+  PriorConfig& prior = result.prior;
+  const auto state_pose = [](const std::optional<PoseSigma>& sigma, double& rotation, double& position) {
+    if (!sigma) return;
+    rotation = sigma->rotation;
+    position = sigma->position;
+  };
+  prior.gyro_bias = calibration.imu.gyro_bias_sigma.value_or(prior.gyro_bias);
+  prior.accel_bias = calibration.imu.accel_bias_sigma.value_or(prior.accel_bias);
+  prior.time_offset = calibration.camera_time_offset_sigma.value_or(prior.time_offset);
+  const std::vector<CameraCalibration>& cameras = calibration.cameras;
+  if (!cameras.empty()) state_pose(cameras[0].pose_sigma, prior.camera_rotation, prior.camera_position);
+  if (cameras.size() > 1) state_pose(cameras[1].pose_sigma, prior.stereo_rotation, prior.stereo_position);
+  if (const auto& encoder = calibration.encoder) {
+    const double radius = 0.5 * (encoder->wheel_radius[0] + encoder->wheel_radius[1]);
+    if (const auto& sigma = encoder->wheel_radius_sigma) {
+      prior.wheel_scale = *sigma / radius;
+      prior.wheel_radius = std::sqrt(2.0) * prior.wheel_scale;
+    }
+    if (const auto& sigma = encoder->wheel_radius_difference_sigma) {
+      const double independent = std::sqrt(2.0) * prior.wheel_radius;
+      const double missing = std::pow(radius / *sigma, 2) - 1.0 / (independent * independent);
+      prior.wheel_apart = 1.0 / std::sqrt(2.0 * std::max(missing, 1.0));
+    }
+    if (const auto& sigma = encoder->track_width_sigma) prior.track_width = *sigma / encoder->track_width;
+    state_pose(encoder->T_BO_sigma, prior.odometer_rotation, prior.axle);
+    state_pose(encoder->T_BO_sigma, prior.odometer_unseen, prior.axle_unseen);
+  }
+  if (calibration.lasers) prior.beam_offset = calibration.lasers->offset_sigma.value_or(prior.beam_offset);
+  return result;
 }
 
 double focal_length(const Calibration& calibration) {

@@ -12,6 +12,10 @@ namespace ear {
 [[nodiscard]] const FilterConfig& checked(const FilterConfig& config);
 [[nodiscard]] const Calibration& checked(const Calibration& calibration);
 
+/// The settings for these sensors: the standard deviations that the calibration states replace those of
+/// FilterConfig::prior, and an IMU whose usual interval is long has no gap at each. Both are usable.
+[[nodiscard]] FilterConfig settings_for(const FilterConfig& config, const Calibration& calibration);
+
 /// Pixels per unit of normalized coordinates; 1 without a camera, where nothing is measured in pixels.
 [[nodiscard]] double focal_length(const Calibration& calibration);
 

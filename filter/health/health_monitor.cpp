@@ -215,7 +215,18 @@ void HealthMonitor::decide(TimeNs t_ns) {
   if (status != health_.status) health_.since_ns = t_ns;
   if (health_.status == HealthStatus::lost && status != HealthStatus::lost) ++health_.reset_counter;
   health_.status = status;
+  health_.reason = reason(t_ns);
   if (status == HealthStatus::lost || status == HealthStatus::initialising) health_.quality = 0;
+}
+
+/// Why there is no estimate, by the status that was decided.
+Reason HealthMonitor::reason(TimeNs t_ns) const {
+  if (usable()) return Reason::none;
+  if (!last_.running) return !life_.any_frame && life_.started ? Reason::clock_or_gap : last_.waits_for;
+  if (!life_.started) return Reason::vague_velocity;
+  if (!last_.possible) return Reason::not_a_number;
+  if (life_.contradicted) return Reason::images_contradict;
+  return seconds_between(life_.aided_ns, t_ns) < kUnaided ? Reason::velocity_lost : Reason::inertia_alone;
 }
 
 int HealthMonitor::quality(const Frame& frame) const {

@@ -49,11 +49,12 @@ class HealthMonitor {
 
   /// What is known after a frame was used.
   struct Frame {
-    TimeNs t_ns = 0;       ///< IMU time
-    bool image = true;     ///< false: the estimator moved on without one
-    bool running = false;  ///< there is a state
-    bool possible = true;  ///< and it and its covariance are numbers, variances not negative
-    bool lifted = false;   ///< the vehicle just left the ground or met it, whatever is known of its contact
+    TimeNs t_ns = 0;                      ///< IMU time
+    bool image = true;                    ///< false: the estimator moved on without one
+    bool running = false;                 ///< there is a state
+    bool possible = true;                 ///< and it and its covariance are numbers, variances not negative
+    Reason waits_for = Reason::no_frame;  ///< what the start waits for
+    bool lifted = false;  ///< the vehicle just left the ground or met it, whatever is known of its contact
     FrameAgreement agreement;
     FrameStatistics statistics;
     double speed = 0.0;             ///< [m/s]
@@ -76,6 +77,7 @@ class HealthMonitor {
   void judge_ground(const Frame& frame, const std::array<SourceRecord, kSourceCount>& records);
   void note_silence(TimeNs t_ns);
   void decide(TimeNs t_ns);
+  [[nodiscard]] Reason reason(TimeNs t_ns) const;
   [[nodiscard]] bool wheels_carry(const FrameStatistics& frame) const;
   [[nodiscard]] Aiding aiding_at(TimeNs t_ns) const;
   [[nodiscard]] const FaultState& fault_of(Source source) const;

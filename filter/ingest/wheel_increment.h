@@ -46,7 +46,7 @@ using IncrementPart = WheelIncrement;
 
 /// Calls f(part) for the parts of the increments in [from_ns, to_ns], in time order, until one returns false. Readings
 /// do not come when frames do: an increment is shared out in proportion, the last one goes on as it was. False if f
-/// was, and where readings are missing for longer than 50 ms.
+/// was, and where readings are missing: for longer than 50 ms and than the last increment.
 template <typename Function>
 bool for_each_part(const WheelIncrements& increments, TimeNs from_ns, TimeNs to_ns, const Function& f) {
   constexpr TimeNs kMissedReading = 50'000'000;  // [ns]
@@ -55,7 +55,8 @@ bool for_each_part(const WheelIncrements& increments, TimeNs from_ns, TimeNs to_
     const WheelIncrement& whole = increments[i];
     const bool last = i + 1 == increments.size();
     if (whole.to_ns <= now_ns && !last) continue;
-    if (whole.from_ns > now_ns + kMissedReading || (last && to_ns > whole.to_ns + kMissedReading)) return false;
+    const TimeNs missed = std::max(kMissedReading, whole.to_ns - whole.from_ns);
+    if (whole.from_ns > now_ns + kMissedReading || (last && to_ns > whole.to_ns + missed)) return false;
     const TimeNs end_ns = last ? to_ns : std::min(to_ns, whole.to_ns);
     const double share = seconds_between(now_ns, end_ns) / whole.duration();
     if (!f(IncrementPart{now_ns, end_ns, whole.angle * share})) return false;

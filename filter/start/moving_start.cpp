@@ -105,10 +105,12 @@ Eigen::Vector3d MovingStart::gyro_bias(const ImuBuffer& imu) const {
   return sum / weight;
 }
 
+bool MovingStart::spans_enough() const {
+  return frames_.size() >= kFewestFrames && seconds_between(frames_.front().t_ns, frames_.back().t_ns) >= kSpan;
+}
+
 std::optional<ImuState> MovingStart::solve(const ImuBuffer& imu) const {
-  if (frames_.size() < kFewestFrames || seconds_between(frames_.front().t_ns, frames_.back().t_ns) < kSpan) {
-    return std::nullopt;
-  }
+  if (!spans_enough()) return std::nullopt;
   const Eigen::Vector3d b_g = gyro_bias(imu);
   const TimeNs start_ns = frames_.front().t_ns;
   Matrix A = Matrix::Zero();

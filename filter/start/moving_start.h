@@ -33,6 +33,9 @@ class MovingStart {
   /// The next frame, at IMU time `t_ns`. Where its motion is not known, what came before is forgotten.
   void add(TimeNs t_ns, const FeatureFrame& frame, const ImuBuffer& imu, const CameraState& cameras);
 
+  /// Are the frames kept enough for solve()?
+  [[nodiscard]] bool spans_enough() const;
+
   /// A state at the first frame kept; nothing while the frames span too little, or contradict the inertial samples.
   /// Least squares over the velocity v and gravity g of that moment, in the body as it then was (B), and the biases:
   ///   p_k+1 - p_k = v dt + g (t_k+1^2 - t_k^2) / 2 + double integral of R f          p_k: from the cameras

@@ -1,13 +1,15 @@
 #include "filter/start/rolling_start.h"
 
 #include <cmath>
+#include <vector>
 
+#include "filter/ingest/median.h"
 #include "filter/start/known_gravity.h"
 
 namespace ear {
 namespace {
 
-constexpr double kLongestTurn = 0.1;      // [s] between two readings
+constexpr double kOldest = 0.5;           // [s] chosen: an older reading shows nothing of now
 constexpr double kSpeedSigma = 0.02;      // [m/s]
 constexpr double kDirectionSigma = 0.05;  // [rad] of the velocity in the body: it pitches about the axle
 constexpr double kWorstFit = 2.0;         // root mean square residual, in standard deviations
@@ -34,15 +36,20 @@ struct Sums {
   }
 };
 
-}  // namespace
+/// How far intervals between readings are from the usual one, as a standard deviation [s]: stamps may be off by that.
+double interval_scatter(const Ring<WheelIncrement>& turns) {
+  constexpr double kSigmaOfMedian = 1.4826;  // of normal values, over the median of their deviations
+  std::vector<double> values;
+  for (std::size_t k = 0; k < turns.size(); ++k) values.push_back(turns[k].duration());
+  const double usual = upper_median(values);
+  for (double& value : values) value = std::abs(value - usual);
+  return kSigmaOfMedian * upper_median(values);
+}
 
-std::optional<ImuState> rolling_start(const ImuBuffer& imu, const Ring<WheelIncrement>& turns,
-                                      const OdometerState& odometer, const RollingStartNoise& noise,
-                                      double min_duration) {
-  if (turns.empty()) return std::nullopt;
+/// `scatter` [s]: of the readings' intervals.
+std::optional<ImuState> fit_motion(const ImuBuffer& imu, const Ring<WheelIncrement>& turns,
+                                   const OdometerState& odometer, const RollingStartNoise& noise, double scatter) {
   const TimeNs start_ns = turns.front().from_ns;
-  if (imu.empty() || imu[0].t_ns > start_ns) return std::nullopt;
-
   Matrix A = Matrix::Zero();
   Vector b = Vector::Zero();
   double cost = 0.0;
@@ -52,8 +59,7 @@ std::optional<ImuState> rolling_start(const ImuBuffer& imu, const Ring<WheelIncr
   TimeNs now_ns = start_ns;
   for (std::size_t k = 0; k < turns.size(); ++k) {
     const WheelIncrement& turn = turns[k];
-    if (turn.duration() > kLongestTurn || (k > 0 && turn.from_ns != turns[k - 1].to_ns)) return std::nullopt;
-    const TimeNs middle_ns = turn.from_ns + (turn.to_ns - turn.from_ns) / 2;
+    const TimeNs middle_ns = middle_of(turn);
     Eigen::Vector3d rate = Eigen::Vector3d::Zero();
     imu.for_each_piece(now_ns, middle_ns,
                        [&](const Eigen::Vector3d& gyro_B, const Eigen::Vector3d& accel_B, double dt) {
@@ -71,13 +77,12 @@ std::optional<ImuState> rolling_start(const ImuBuffer& imu, const Ring<WheelIncr
     H.middleCols<3>(kBg) = sums.gained_by_b_g - skew(u) * sums.R_integral;
     H.middleCols<3>(kBa) = -sums.R_integral;
     const Eigen::Vector3d z = u - sums.gained;
-    const double sigma = std::hypot(kSpeedSigma, kDirectionSigma * speed);
+    const double direction = std::hypot(kDirectionSigma, scatter / turn.duration());
+    const double sigma = std::hypot(kSpeedSigma, direction * speed);
     A += H.transpose() * H / (sigma * sigma);
     b += H.transpose() * z / (sigma * sigma);
     cost += z.squaredNorm() / (sigma * sigma);
   }
-  if (seconds_between(start_ns, turns.back().to_ns) < min_duration) return std::nullopt;
-
   const Vector x = solve_with_known_gravity(A, b, kG);
   const double fit = x.dot(A * x) - 2.0 * b.dot(x) + cost;
   if (!(fit <= 3.0 * kWorstFit * kWorstFit * static_cast<double>(turns.size()))) return std::nullopt;
@@ -89,6 +94,25 @@ std::optional<ImuState> rolling_start(const ImuBuffer& imu, const Ring<WheelIncr
   state.b_g = x.segment<3>(kBg);
   state.b_a = x.segment<3>(kBa);
   return state;
+}
+
+}  // namespace
+
+Reason lacking_for_rolling_start(const ImuBuffer& imu, const Ring<WheelIncrement>& turns, TimeNs now_ns,
+                                 double min_duration) {
+  if (turns.empty() || seconds_between(turns.back().to_ns, now_ns) > kOldest) return Reason::wheel_gaps;
+  for (std::size_t k = 1; k < turns.size(); ++k) {
+    if (turns[k].from_ns != turns[k - 1].to_ns) return Reason::wheel_gaps;
+  }
+  const TimeNs start_ns = turns.front().from_ns;
+  if (imu.empty() || imu[0].t_ns > start_ns) return Reason::few_samples;
+  return seconds_between(start_ns, turns.back().to_ns) < min_duration ? Reason::few_readings : Reason::none;
+}
+
+std::optional<ImuState> rolling_start(const ImuBuffer& imu, const Ring<WheelIncrement>& turns,
+                                      const OdometerState& odometer, const RollingStartNoise& noise) {
+  const std::optional<ImuState> state = fit_motion(imu, turns, odometer, noise, 0.0);
+  return state ? state : fit_motion(imu, turns, odometer, noise, interval_scatter(turns));
 }
 
 }  // namespace ear

@@ -4,6 +4,7 @@
 
 #include <optional>
 
+#include "ear/health.h"
 #include "filter/ekf/state.h"
 #include "filter/ingest/imu_buffer.h"
 #include "filter/ingest/ring.h"
@@ -21,10 +22,16 @@ struct RollingStartNoise {
 /// body as it then was (B), and the biases:
 ///   R_Bk u_k = v + g t_k + integral of R f,      u_k: the body's velocity that the wheels measure, along the
 ///   odometer's x
-/// It is a point to linearize at, not an estimate: the samples may be used again. Nothing if the turns have gaps, span
-/// less than `min_duration` [s], or contradict the inertial samples, as they do in the air or on slipping wheels.
+/// It is a point to linearize at, not an estimate: the samples may be used again. Nothing if the turns contradict the
+/// inertial samples, as they do in the air or on slipping wheels, also if their stamps are as uncertain as they are
+/// irregular. They must be all that lacking_for_rolling_start()
+/// asks for.
 [[nodiscard]] std::optional<ImuState> rolling_start(const ImuBuffer& imu, const Ring<WheelIncrement>& turns,
-                                                    const OdometerState& odometer, const RollingStartNoise& noise,
-                                                    double min_duration);
+                                                    const OdometerState& odometer, const RollingStartNoise& noise);
+
+/// What the readings lack for a rolling start: Reason::none if the turns follow each other up to `now_ns` or shortly
+/// before, span `min_duration` [s], and the inertial samples reach back to the first.
+[[nodiscard]] Reason lacking_for_rolling_start(const ImuBuffer& imu, const Ring<WheelIncrement>& turns, TimeNs now_ns,
+                                               double min_duration);
 
 }  // namespace ear

@@ -1,8 +1,12 @@
 #include "filter/start/start.h"
 
+#include <algorithm>
 #include <cmath>
+#include <stdexcept>
+#include <string>
 
 #include "filter/ekf/initial_state.h"
+#include "filter/ingest/stamp_guard.h"
 #include "filter/start/rolling_start.h"
 
 namespace ear {
@@ -16,7 +20,35 @@ constexpr double kLeastStartSpeed = 0.2;     // [m/s] chosen: a first start in m
 constexpr double kKnownSigma = 1e-6;         // [m, rad] of position and yaw at the start: by definition zero
 constexpr double kUnknownTilt = 0.3;         // [rad] before gravity was measured
 
+constexpr double kVague = 10.0;          // times the sigma of a velocity that is then measured with that sigma
+constexpr double kUnitTolerance = 1e-3;  // of the length of a quaternion: digits that were cut off
+
 }  // namespace
+
+GivenStart checked(const GivenStart& given) {
+  const auto require = [](bool condition, const char* what) {
+    if (!condition) throw std::invalid_argument(std::string("start: ") + what);
+  };
+  const auto require_sigma = [&](double sigma, bool zero_too, const char* what) {
+    require(std::isfinite(sigma) && (sigma > 0.0 || (zero_too && sigma == 0.0)), what);
+  };
+  GivenStart start = given;
+  NavState& x = start.state;
+  require(is_time(x.t_ns), "t_ns: farther from zero than 142 years");
+  require(x.p_WB.allFinite(), "p_WB: not finite");
+  require(std::abs(x.q_WB.norm() - 1.0) < kUnitTolerance, "q_WB: a quaternion of length one is needed");
+  require(x.v_W.allFinite(), "v_W: not finite");
+  require(x.b_g.allFinite(), "b_g: not finite");
+  require(x.b_a.allFinite(), "b_a: not finite");
+  require_sigma(start.tilt_sigma, false, "tilt_sigma: must be positive");
+  require_sigma(start.yaw_sigma, true, "yaw_sigma: must not be negative");
+  require_sigma(start.position_sigma, true, "position_sigma: must not be negative");
+  require_sigma(start.velocity_sigma, false, "velocity_sigma: must be positive");
+  require_sigma(start.gyro_bias_sigma.value_or(1.0), false, "gyro_bias_sigma: must be positive");
+  require_sigma(start.accel_bias_sigma.value_or(1.0), false, "accel_bias_sigma: must be positive");
+  x.q_WB.normalize();
+  return start;
+}
 
 Start::Start(const FilterConfig& config, const Calibration& calibration)
     : config_(config),
@@ -31,24 +63,38 @@ bool Start::scale_is_given() const {
 }
 
 std::optional<StartState> Start::find(const Situation& now, const ImuStatistics& recent, const Ingest& ingest) {
+  if (given_) return as_given(now.t_ns, ingest.imu());
   std::optional<StartState> start;
-  if (now.stands && recent.count >= 2) start = standing(now.t_ns, recent);
+  Reason lacks = recent.count < 2 ? Reason::few_samples : Reason::moves_unseen;
+  if (now.stands && recent.count >= 2) {
+    start = standing(now.t_ns, recent);
+    lacks = Reason::other_gravity;
+  }
   if (!start && now.rolls) {
     const RollingStartNoise noise{config_.prior.gyro_bias, config_.prior.accel_bias};
     const OdometerState odometer = odometer_state(calibration_);
-    const auto x = rolling_start(ingest.imu(), ingest.waiting_increments(), odometer, noise, kRollingStart);
+    lacks = lacking_for_rolling_start(ingest.imu(), ingest.waiting_increments(), now.t_ns, kRollingStart);
+    const std::optional<ImuState> x = lacks == Reason::none
+                                          ? rolling_start(ingest.imu(), ingest.waiting_increments(), odometer, noise)
+                                          : std::nullopt;
     if (x) start = in_motion(*x);
+    if (lacks == Reason::none) lacks = Reason::wheels_contradict;
   }
   if (start) return start;
   start = find_in_motion(now, ingest, true);
   // A first start can wait for the vehicle to stand, which shows gravity and biases better, or to move.
   const bool waits = start && !now.restarts && start->x.v_W.norm() < kLeastStartSpeed;
+  if (waits) waits_for_ = Reason::slow;
+  if (calibration_.cameras.size() < 2 || lacks == Reason::other_gravity || now.rolls) waits_for_ = lacks;
   return waits ? std::nullopt : start;
 }
 
 std::optional<StartState> Start::find_in_motion(const Situation& now, const Ingest& ingest, bool contradicted) {
+  if (given_) return as_given(now.t_ns, ingest.imu());
+  waits_for_ = calibration_.cameras.size() < 2 ? Reason::moves_unseen : Reason::few_frames;
   if (calibration_.cameras.size() < 2 || now.frame.features.empty()) return std::nullopt;
   moving_.add(now.t_ns, now.frame, ingest.imu(), now.cameras);
+  if (moving_.spans_enough()) waits_for_ = Reason::cameras_contradict;
   const std::optional<ImuState> x = contradicted ? moving_.solve(ingest.imu()) : std::nullopt;
   if (!x) return std::nullopt;
   StartState start = in_motion(*x);
@@ -59,12 +105,16 @@ std::optional<StartState> Start::find_in_motion(const Situation& now, const Inge
 MapAlignment Start::begin(const StartState& start, const std::optional<Estimate>& last_good, const Advice& advice,
                           Ingest& ingest, Ekf& ekf, Sources& sources, Records& records) {
   ekf.start(start.x, start.sigma, scale_is_given());
-  if (start.residual.size() > 0) {
+  if (start.alignment) {
+    ingest.drop_before(start.x.t_ns);
+  } else if (start.residual.size() > 0) {
     ingest.drop_readings();  // of the time when it stood
-    ekf.apply(start.H, 0, start.residual, CameraUpdate::considered);
   }
-  MapAlignment alignment;
-  if (last_good) {
+  if (start.residual.size() > 0) ekf.apply(start.H, 0, start.residual, CameraUpdate::considered);
+  MapAlignment alignment = start.alignment.value_or(MapAlignment{});
+  if (start.alignment) {
+    given_.reset();
+  } else if (last_good) {
     alignment = align_after_restart(*last_good, ekf.state().imu, ingest.imu(), calibration_.imu.gyro_noise);
   }
   if (start.from_frames) {
@@ -79,6 +129,32 @@ MapAlignment Start::begin(const StartState& start, const std::optional<Estimate>
   }
   forget_frames();
   return alignment;
+}
+
+/// In a world of its own, whose origin is where the vehicle was: far from it rotation and position have nothing to do
+/// with each other. The velocity is given in the world, not in the body, whose attitude is uncertain:
+/// dv = nu - [v]x theta.
+std::optional<StartState> Start::as_given(TimeNs t_ns, const ImuBuffer& imu) {
+  const NavState& given = given_->state;
+  waits_for_ = t_ns < given.t_ns ? Reason::start_is_ahead : Reason::start_is_past;
+  if (t_ns < given.t_ns || imu.empty() || imu[0].t_ns > given.t_ns) return std::nullopt;
+  StartState start;
+  start.x = {given.t_ns, given.q_WB.toRotationMatrix(), given.v_W, Eigen::Vector3d::Zero(), given.b_g, given.b_a};
+  start.sigma = sigma();
+  const double yaw = std::max(given_->yaw_sigma, kKnownSigma);
+  start.sigma.segment<3>(err::theta) << given_->tilt_sigma, given_->tilt_sigma, yaw;
+  start.sigma.segment<3>(err::nu).setConstant(
+      kVague * std::hypot(given_->velocity_sigma, given.v_W.norm() * std::hypot(given_->tilt_sigma, yaw)));
+  if (given_->gyro_bias_sigma) start.sigma.segment<3>(err::b_g).setConstant(*given_->gyro_bias_sigma);
+  if (given_->accel_bias_sigma) start.sigma.segment<3>(err::b_a).setConstant(*given_->accel_bias_sigma);
+  start.H.setZero(3, err::imu_size);
+  start.H.middleCols<3>(err::theta) = -skew(given.v_W) / given_->velocity_sigma;
+  start.H.middleCols<3>(err::nu) = Eigen::Matrix3d::Identity() / given_->velocity_sigma;
+  start.residual.setZero(3);
+  start.alignment.emplace();
+  start.alignment->p_WA = given.p_WB;
+  start.alignment->position_sigma = given_->position_sigma;
+  return start;
 }
 
 std::optional<StartState> Start::standing(TimeNs t_ns, const ImuStatistics& imu) const {

@@ -1,5 +1,5 @@
-// Where the filter begins: standing, rolling, or in motion with two cameras. Each gives a start state, or nothing.
-// docs/filter.md, "Starts".
+// Where the filter begins: where it is told, standing, rolling, or in motion with two cameras. Each gives a start
+// state, or nothing. docs/filter.md, "Starts".
 #pragma once
 
 #include <Eigen/Core>
@@ -7,6 +7,7 @@
 
 #include "ear/calibration.h"
 #include "ear/filter_config.h"
+#include "ear/given_start.h"
 #include "filter/advice.h"
 #include "filter/ekf/ekf.h"
 #include "filter/ekf/records.h"
@@ -20,16 +21,24 @@ namespace ear {
 struct StartState {
   ImuState x;
   Eigen::VectorXd sigma;  ///< standard deviations of the whole error vector
-  /// What the mean samples show of attitude and biases, whitened: residual = H e + n, by the inertial part. No rows but
-  /// for a standing start.
+  /// What the mean samples show of attitude and biases of a vehicle that stands, or what was given of the velocity,
+  /// whitened: residual = H e + n, by the inertial part. No rows for the other starts.
   Eigen::Matrix<double, Eigen::Dynamic, err::imu_size> H;
   Eigen::VectorXd residual;
   bool from_frames = false;  ///< in motion, at the first of the frames kept: all of them are to be taken in
+  std::optional<MapAlignment> alignment;  ///< where it was given
 };
 
 class Start {
  public:
   Start(const FilterConfig& config, const Calibration& calibration);
+
+  /// There is no other start than this one, which is usable, until it is the state.
+  void give(const GivenStart& start) { given_ = start; }
+  /// What the other one was given.
+  void succeed(const Start& before) { given_ = before.given_; }
+  /// What the last call of find() or find_in_motion() lacked; without meaning where it found a start.
+  [[nodiscard]] Reason waits_for() const { return waits_for_; }
 
   /// The vehicle at a frame, without a state.
   struct Situation {
@@ -40,7 +49,7 @@ class Start {
     bool restarts = false;  ///< not the first start
     CameraState cameras;
   };
-  /// The first that can: standing, rolling, moving with two cameras.
+  /// The one that was given, or else the first that can: standing, rolling, moving with two cameras.
   [[nodiscard]] std::optional<StartState> find(const Situation& now, const ImuStatistics& recent, const Ingest& ingest);
   /// In place of a state that the cameras contradict, of the frames since `frame` was first given: moving alone.
   [[nodiscard]] std::optional<StartState> find_in_motion(const Situation& now, const Ingest& ingest, bool contradicted);
@@ -57,6 +66,7 @@ class Start {
   [[nodiscard]] bool scale_is_given() const;
 
  private:
+  [[nodiscard]] std::optional<StartState> as_given(TimeNs t_ns, const ImuBuffer& imu);
   [[nodiscard]] std::optional<StartState> standing(TimeNs t_ns, const ImuStatistics& imu) const;
   [[nodiscard]] bool uses_wheels() const;
   [[nodiscard]] Eigen::VectorXd sigma() const;
@@ -65,6 +75,8 @@ class Start {
   FilterConfig config_;
   Calibration calibration_;
   MovingStart moving_;
+  std::optional<GivenStart> given_;
+  Reason waits_for_ = Reason::few_samples;
 };
 
 }  // namespace ear

@@ -1,4 +1,7 @@
 // The sensors of a recording or a vehicle: geometry, lenses, noise. Frames: docs/design.md, section 1.
+//
+// A member whose name ends in _sigma says how well a value is known, as a standard deviation. Where it is empty, the
+// setting in PriorConfig holds.
 #pragma once
 
 #include <Eigen/Core>
@@ -17,6 +20,12 @@ enum class LensModel {
   equidistant         ///< k1, k2, k3, k4 (Kannala-Brandt)
 };
 
+/// How well a pose is known, about and along each axis.
+struct PoseSigma {
+  double rotation = 0.0;  ///< [rad]
+  double position = 0.0;  ///< [m]
+};
+
 struct CameraCalibration {
   Eigen::Isometry3d T_BC = Eigen::Isometry3d::Identity();  ///< camera (x right, y down, z forward) to body
   int width = 0;                                           ///< [px]
@@ -25,15 +34,19 @@ struct CameraCalibration {
   LensModel lens = LensModel::radial_tangential;
   std::array<double, 5> distortion{};  ///< the fifth, k3, is 0 in a model of four
   double rate_hz = 0.0;
+  /// Of the left camera in the body; of the right one in the left one, which is known better than either in the body.
+  std::optional<PoseSigma> pose_sigma;
 };
 
 /// Continuous-time noise of the IMU, EuRoC's keys.
 struct ImuCalibration {
   double rate_hz = 200.0;
-  double gyro_noise = 1e-3;         ///< [rad/s/sqrt(Hz)]
-  double gyro_random_walk = 2e-5;   ///< [rad/s^2/sqrt(Hz)]
-  double accel_noise = 1e-2;        ///< [m/s^2/sqrt(Hz)]
-  double accel_random_walk = 3e-4;  ///< [m/s^3/sqrt(Hz)]
+  double gyro_noise = 1e-3;                ///< [rad/s/sqrt(Hz)]
+  double gyro_random_walk = 2e-5;          ///< [rad/s^2/sqrt(Hz)]
+  double accel_noise = 1e-2;               ///< [m/s^2/sqrt(Hz)]
+  double accel_random_walk = 3e-4;         ///< [m/s^3/sqrt(Hz)]
+  std::optional<double> gyro_bias_sigma;   ///< [rad/s] of the bias at the start, about zero
+  std::optional<double> accel_bias_sigma;  ///< [m/s^2]
 };
 
 /// Two wheels on one axle. O is the middle of the axle: x forward, y left along the axle, z up.
@@ -45,6 +58,10 @@ struct EncoderCalibration {
   std::array<double, 2> wheel_radius{0.075, 0.075};  ///< left, right [m]
   double track_width = 0.40;                         ///< [m]
   double noise_counts = 2.0;                         ///< one reading, 1-sigma [count]
+  std::optional<PoseSigma> T_BO_sigma;
+  std::optional<double> wheel_radius_sigma;             ///< of the mean of both radii [m]
+  std::optional<double> wheel_radius_difference_sigma;  ///< of the left radius less the right one [m]
+  std::optional<double> track_width_sigma;              ///< [m]
 };
 
 struct LaserBeam {
@@ -56,17 +73,19 @@ struct LaserBeam {
 struct LaserCalibration {
   std::vector<LaserBeam> beams;
   double rate_hz = 50.0;
-  double range_min = 0.02;  ///< [m]
-  double range_max = 4.0;   ///< [m]
-  double noise = 0.004;     ///< 1-sigma [m]
+  double range_min = 0.02;             ///< [m]
+  double range_max = 4.0;              ///< [m]
+  double noise = 0.004;                ///< 1-sigma [m]
+  std::optional<double> offset_sigma;  ///< of what each beam reads too much [m]
 };
 
 /// The largest camera_time_offset [s] that an estimator takes.
 inline constexpr double kLargestTimeOffset = 3600.0;
 
 struct Calibration {
-  std::vector<CameraCalibration> cameras;  ///< none, one, or two (left, right)
-  double camera_time_offset = 0.0;         ///< [s] add it to a camera stamp to get IMU time
+  std::vector<CameraCalibration> cameras;          ///< none, one, or two (left, right)
+  double camera_time_offset = 0.0;                 ///< [s] add it to a camera stamp to get IMU time
+  std::optional<double> camera_time_offset_sigma;  ///< [s]
   ImuCalibration imu;
   std::optional<EncoderCalibration> encoder;
   std::optional<LaserCalibration> lasers;

@@ -48,6 +48,7 @@ typedef struct {
   ear_lens lens;
   double distortion[5]; /* OpenCV's order: k1 k2 p1 p2 k3, or k1 k2 k3 k4 0 */
   double rate_hz;
+  double rotation_sigma, position_sigma; /* [rad, m] of T_BC; of the right camera in the left one; 0: not known */
 } ear_camera;
 
 typedef struct {
@@ -55,6 +56,8 @@ typedef struct {
   double d_B[3];  /* its unit direction */
 } ear_beam;
 
+/* Standard deviations, named ..._sigma: those that are 0 are not known, and the defaults of ear/filter_config.h hold.
+ */
 typedef struct {
   int32_t camera_count; /* 0, 1, or 2 (left, right) */
   ear_camera cameras[EAR_MAX_CAMERAS];
@@ -80,6 +83,14 @@ typedef struct {
   double laser_rate_hz;
   double range_min, range_max; /* [m] */
   double laser_noise;          /* 1-sigma [m] */
+
+  double camera_time_offset_sigma;                         /* [s] */
+  double gyro_bias_sigma, accel_bias_sigma;                /* [rad/s, m/s^2] */
+  double odometer_rotation_sigma, odometer_position_sigma; /* [rad, m] of T_BO */
+  double wheel_radius_sigma;                               /* of the mean of both radii [m] */
+  double wheel_radius_difference_sigma;                    /* of left less right [m] */
+  double track_width_sigma;                                /* [m] */
+  double beam_offset_sigma;                                /* of what each beam reads too much [m] */
 } ear_calibration;
 
 /* No camera, no wheels, no lasers; noise and rates as in ear/calibration.h. */
@@ -153,8 +164,7 @@ ear_result ear_add_stereo(ear_odometry* odometry, const ear_stereo_frame* frame)
 
 typedef enum {
   EAR_WAITING_FOR_IMU = 0,
-  EAR_WAITING_FOR_STANDSTILL =
-      1, /* the vehicle moves, and has neither wheels on the ground nor two cameras to start with */
+  EAR_WAITING_FOR_STANDSTILL = 1, /* it cannot start yet; ear_health.reason says why */
   EAR_TRACKING = 2,
   EAR_LOST = 3 /* there was an estimate; it may be anywhere now, and starts again as it can */
 } ear_status;
@@ -180,6 +190,24 @@ typedef struct {
   int32_t standing;                 /* the vehicle was held by a standstill update */
   int32_t on_ground;                /* the wheels carry the vehicle */
 } ear_estimate;
+
+/* A state to begin with, and standard deviations of what is known of it. */
+typedef struct {
+  ear_state state;         /* biases are zero unless they are known */
+  double tilt_sigma;       /* [rad] of roll and pitch, each */
+  double yaw_sigma;        /* [rad]; zero: the world's yaw is this one's by definition */
+  double position_sigma;   /* [m] each axis; zero: the same for its origin */
+  double velocity_sigma;   /* [m/s] each axis */
+  double gyro_bias_sigma;  /* [rad/s] each axis; 0: as for any other start */
+  double accel_bias_sigma; /* [m/s^2] each axis; 0: as for any other start */
+} ear_start;
+
+/* At the origin, upright, at rest, with the defaults of ear/given_start.h. */
+void ear_default_start(ear_start* start);
+
+/* Begins at the first frame or step that is not earlier than this state, whatever the other sensors show; as
+ * Odometry::start_at() of ear/odometry.h. EAR_INVALID_ARGUMENT, with the reason in message as for ear_create(). */
+ear_result ear_start_at(ear_odometry* odometry, const ear_start* start, char* message, size_t message_size);
 
 /* Hands the waiting samples to the estimator, ordered by time, and then the oldest frame, once inertial samples reach
  * its time or all slots are taken. EAR_OK: *estimate is that frame's. EAR_NO_ESTIMATE: before the start, and of a frame
@@ -234,8 +262,12 @@ typedef enum {
   EAR_AIDING_CAMERAS_AND_WHEELS = 4
 } ear_aiding;
 
+/* Why there is no estimate: meanings in ear/health.h, in its order; ear_reason_text() says it in English. */
+typedef int32_t ear_reason; /* 0: there is one */
+
 typedef struct {
   ear_health_status status;
+  ear_reason reason;                  /* why there is no estimate */
   int64_t since_ns;                   /* when the status began, IMU time */
   uint32_t faulty;                    /* sources that the estimate should rest on, and does not */
   int64_t onset_ns[EAR_SOURCE_COUNT]; /* of these: since when */
@@ -249,6 +281,9 @@ typedef struct {
 
 /* At any time, also without an estimate. The consumer's thread. */
 ear_result ear_health_of(const ear_odometry* odometry, ear_health* health);
+
+/* What a start waits for, or how the estimate was lost, in English. */
+const char* ear_reason_text(ear_reason reason);
 
 /* The name of a source, such as "wheel_left"; "unknown source" for what is none. */
 const char* ear_source_text(ear_source source);

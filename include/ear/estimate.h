@@ -17,7 +17,7 @@ namespace ear {
 /// Where the estimator is in its life.
 enum class Status : std::uint8_t {
   waiting_for_imu,         ///< too few inertial samples yet
-  waiting_for_standstill,  ///< the vehicle moves, and has neither wheels on the ground nor two cameras to start with
+  waiting_for_standstill,  ///< it cannot start yet; Health::reason says why
   tracking,
   lost  ///< there was an estimate; it may be anywhere now (Health::status), and starts again as it can
 };
@@ -28,7 +28,8 @@ namespace estimate_error {
 inline constexpr int rotation = 0, velocity = 3, position = 6, gyro_bias = 9, accel_bias = 12, size = 15;
 }
 
-/// The state of the vehicle at one instant. World W: z up, origin and yaw at the first pose. Body B: the IMU.
+/// The state of the vehicle at one instant. World W: z up, origin and yaw at the first pose, unless the start was given
+/// (GivenStart). Body B: the IMU.
 struct NavState {
   TimeNs t_ns = 0;
   Eigen::Quaterniond q_WB = Eigen::Quaterniond::Identity();

@@ -18,6 +18,31 @@ enum class HealthStatus : std::uint8_t {
   lost           ///< there was an estimate; now it may be anywhere, and none is given
 };
 
+/// Why there is no estimate.
+enum class Reason : std::uint8_t {
+  none,  ///< there is one
+  // What a start waits for, the first one or another after `lost`.
+  no_frame,            ///< neither an image came nor a step was asked for, that inertial samples reach
+  few_samples,         ///< inertial samples are missing
+  other_gravity,       ///< it stands, but the mean specific force is not gravity: another unit, or a broken sensor
+  moves_unseen,        ///< it moves, and neither two cameras nor wheels on the ground show how far
+  few_readings,        ///< it rolls: the wheels' readings do not yet span the time that a start takes
+  wheel_gaps,          ///< it rolls: readings of the wheels are missing, or more than 0.25 s apart
+  wheels_contradict,   ///< it rolls: wheels and inertial samples show different motions, as with slip
+  few_frames,          ///< it moves: the frames whose features fit each other do not yet span the time for a start
+  cameras_contradict,  ///< it moves: cameras and inertial samples show different motions
+  slow,                ///< too slow for a first start in motion, too unsteady for one at rest
+  start_is_ahead,      ///< the time of the start that was given is not yet there
+  start_is_past,       ///< the inertial samples do not reach back to the start that was given
+  vague_velocity,      ///< there is a state, whose velocity is not known well enough yet
+  // How it was lost.
+  inertia_alone,      ///< nothing but inertial samples for two seconds
+  velocity_lost,      ///< the velocity's standard deviation is too large
+  images_contradict,  ///< for a second, images do not show what the state expects, and no wheels agree with it
+  not_a_number,       ///< the state or its covariance is not finite, or has a negative variance
+  clock_or_gap        ///< two seconds without inertial samples, or their clock was set back
+};
+
 /// What can be wrong by itself.
 enum class Source : std::uint8_t {
   camera_left,
@@ -59,8 +84,9 @@ struct SourceRecord {
 
 struct Health {
   HealthStatus status = HealthStatus::initialising;
-  TimeNs since_ns = 0;                          ///< when the status began (IMU time)
-  SourceSet faulty;                             ///< sources that the estimate should rest on, and does not
+  Reason reason = Reason::no_frame;  ///< why there is no estimate: what a start waits for, or how it was lost
+  TimeNs since_ns = 0;               ///< when the status began (IMU time)
+  SourceSet faulty;                  ///< sources that the estimate should rest on, and does not
   std::array<TimeNs, kSourceCount> onset_ns{};  ///< of these: since when
   Aiding aiding = Aiding::none;                 ///< what is left
   int quality = 0;                              ///< 0 (lost) ... 100

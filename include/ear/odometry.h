@@ -15,6 +15,7 @@
 #include "ear/calibration.h"
 #include "ear/config.h"
 #include "ear/estimate.h"
+#include "ear/given_start.h"
 #include "ear/types.h"
 
 namespace ear {
@@ -30,6 +31,12 @@ class Odometry {
   ~Odometry();
   Odometry(Odometry&&) noexcept;
   Odometry& operator=(Odometry&&) noexcept;
+
+  /// Begins at the first frame or step that is not earlier than the state given, which the inertial samples carry
+  /// there, whatever the other sensors show; until then there is no other start. Where the inertial samples do not
+  /// reach back to its time, there is none at all: Health::reason. Another call replaces it. Throws
+  /// std::invalid_argument, naming the field, as checked() does, and where there is an estimate already.
+  void start_at(const GivenStart& start);
 
   /// Samples of each sensor come in time order, and should be there before the first frame that is later.
   void add_imu(const ImuSample& sample);

@@ -48,6 +48,16 @@ int pixels(const YamlMap& map, double number) {
   return static_cast<int>(number);
 }
 
+// {rotation: rad, position: m}, both if any.
+std::optional<PoseSigma> pose_sigma(const YamlMap& map, const std::string& key) {
+  if (!map.has(key)) return std::nullopt;
+  const YamlMap both = map.child(key);
+  both.require_only({"rotation", "position"});
+  const std::optional<double> rotation = both.sigma("rotation"), position = both.sigma("position");
+  if (!rotation || !position) throw map.error(key, "{rotation: rad, position: m} expected");
+  return PoseSigma{*rotation, *position};
+}
+
 // What EuRoC's sensor.yaml and Kalibr's camchain have in common; they differ in the key of the coefficients.
 CameraCalibration read_lens(const YamlMap& map, const std::string& coefficients_key) {
   const auto camera_model = map.get_or<std::string>("camera_model", "pinhole");
@@ -78,12 +88,18 @@ void read_imu_noise(const YamlMap& map, ImuCalibration& imu) {
   imu.gyro_random_walk = map.get<double>("gyroscope_random_walk");
   imu.accel_noise = map.get<double>("accelerometer_noise_density");
   imu.accel_random_walk = map.get<double>("accelerometer_random_walk");
+  imu.gyro_bias_sigma = map.sigma("gyroscope_bias_sigma");
+  imu.accel_bias_sigma = map.sigma("accelerometer_bias_sigma");
 }
 
-CameraCalibration read_camera(const fs::path& file) {
+CameraCalibration read_camera(const fs::path& file, bool right) {
   const YamlMap map = YamlMap::load(file);
   CameraCalibration camera = read_lens(map, "distortion_coefficients");
   camera.T_BC = map.pose("T_BS");
+  if (right && map.has("T_BS_sigma")) {
+    throw map.error("T_BS_sigma", "of the left camera only; here T_C0C1_sigma: how well this camera is known in cam0");
+  }
+  camera.pose_sigma = pose_sigma(map, right ? "T_C0C1_sigma" : "T_BS_sigma");
   return camera;
 }
 
@@ -98,6 +114,10 @@ EncoderCalibration read_encoder(const fs::path& file) {
   encoder.wheel_radius = {radius[0], radius[1]};
   encoder.track_width = map.get<double>("wheel_separation");
   encoder.noise_counts = map.get<double>("noise_counts");
+  encoder.T_BO_sigma = pose_sigma(map, "T_BS_sigma");
+  encoder.wheel_radius_sigma = map.sigma("wheel_radius_sigma");
+  encoder.wheel_radius_difference_sigma = map.sigma("wheel_radius_difference_sigma");
+  encoder.track_width_sigma = map.sigma("wheel_separation_sigma");
   return encoder;
 }
 
@@ -120,7 +140,14 @@ LaserCalibration read_lasers(const fs::path& file) {
   lasers.range_min = range[0];
   lasers.range_max = range[1];
   lasers.noise = map.get<double>("noise");
+  lasers.offset_sigma = map.sigma("offset_sigma");
   return lasers;
+}
+
+// An optional key beyond EuRoC's, under Kalibr's name.
+void read_time_offset(const YamlMap& map, Calibration& calibration) {
+  calibration.camera_time_offset = map.get_or("timeshift_cam_imu", 0.0);
+  calibration.camera_time_offset_sigma = map.sigma("timeshift_cam_imu_sigma");
 }
 
 // Kalibr's camchain: T_cam_imu takes a point from the IMU to the camera; T_cn_cnm1 from the camera before to this one.
@@ -133,10 +160,11 @@ void read_camchain(const YamlMap& map, Calibration& calibration) {
     const bool chained = i > 0 && !camera_map.has("T_cam_imu");
     const Eigen::Isometry3d T_CB = chained ? camera_map.pose("T_cn_cnm1") * T_CB_before : camera_map.pose("T_cam_imu");
     camera.T_BC = T_CB.inverse(Eigen::Affine);
+    camera.pose_sigma = pose_sigma(camera_map, i > 0 ? "T_cn_cnm1_sigma" : "T_cam_imu_sigma");
     calibration.cameras.push_back(camera);
     T_CB_before = T_CB;
     // t_imu = t_cam + shift, as ours. Both cameras of a pair share one clock: the left one's shift counts.
-    if (i == 0) calibration.camera_time_offset = camera_map.get_or("timeshift_cam_imu", 0.0);
+    if (i == 0) read_time_offset(camera_map, calibration);
   }
 }
 
@@ -172,11 +200,10 @@ std::size_t count_cameras(const fs::path& mav0) {
 
 void read_cameras(const fs::path& mav0, Calibration& calibration) {
   for (const char* name : {"cam0", "cam1"}) {
-    if (has_sensor(mav0, name)) calibration.cameras.push_back(read_camera(mav0 / name / "sensor.yaml"));
+    const bool right = !calibration.cameras.empty();
+    if (has_sensor(mav0, name)) calibration.cameras.push_back(read_camera(mav0 / name / "sensor.yaml", right));
   }
-  if (has_sensor(mav0, "cam0")) {  // an optional key beyond EuRoC's, under Kalibr's name
-    calibration.camera_time_offset = YamlMap::load(mav0 / "cam0" / "sensor.yaml").get_or("timeshift_cam_imu", 0.0);
-  }
+  if (has_sensor(mav0, "cam0")) read_time_offset(YamlMap::load(mav0 / "cam0" / "sensor.yaml"), calibration);
 }
 
 // Reads imu0/sensor.yaml and returns its T_BS: IMU to the body of the files.

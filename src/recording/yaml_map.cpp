@@ -54,6 +54,13 @@ YamlMap::YamlMap(std::filesystem::path file, const YAML::Node& node, std::string
   throw InputError(located(file_, line_of(node_), key, "keys and values expected"));
 }
 
+std::optional<double> YamlMap::sigma(const std::string& key) const {
+  if (!has(key)) return std::nullopt;
+  const auto value = get<double>(key);
+  if (!(value > 0.0)) throw error(key, shown(node_[key]) + " is not positive: it is a standard deviation");
+  return value;
+}
+
 std::vector<double> YamlMap::numbers(const std::string& key, std::size_t size) const {
   const YAML::Node list = required(key);
   if (!list.IsSequence()) throw error_at(list, key, "a list of numbers expected");

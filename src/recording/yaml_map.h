@@ -6,6 +6,7 @@
 #include <Eigen/Geometry>
 #include <cmath>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <type_traits>
 #include <vector>
@@ -36,6 +37,9 @@ class YamlMap {
   [[nodiscard]] T get_or(const std::string& key, const T& otherwise) const {
     return has(key) ? get<T>(key) : otherwise;
   }
+
+  /// A standard deviation that may be missing; it must be positive.
+  [[nodiscard]] std::optional<double> sigma(const std::string& key) const;
 
   /// A list of finite numbers; `size` 0 accepts any length.
   [[nodiscard]] std::vector<double> numbers(const std::string& key, std::size_t size) const;

@@ -37,6 +37,7 @@ class WatchedFilter final : public Estimator {
   WatchedFilter(const FilterConfig& config, const Calibration& calibration, const Simulation& simulation, Seen& seen)
       : filter_(config, calibration), simulation_(simulation), seen_(seen) {}
 
+  void start_at(const GivenStart& start) override { filter_.start_at(start); }
   void add_imu(const ImuSample& sample) override { filter_.add_imu(sample); }
   void add_encoder(const EncoderSample& sample) override { filter_.add_encoder(sample); }
   void add_laser(const LaserSample& sample) override { filter_.add_laser(sample); }

@@ -283,3 +283,79 @@ TEST_CASE("kalibr: imu.yaml with a key imu0, and files that are neither") {
   replace_in(folder / "chain.yaml", "T_cam_imu", "T_cam_body");
   CHECK(contains(input_error_of([&] { load(folder / "mav0", {folder / "chain.yaml"}); }), "cam0.T_cam_imu: missing"));
 }
+
+TEST_CASE("calibration: standard deviations beside the values") {
+  const TempFolder folder;
+  write_full_recording(folder.path());
+  const auto append = [&](const char* sensor, const std::string& text) {
+    const fs::path file = folder / sensor / "sensor.yaml";
+    write_text(file, read_text(file) + "\n" + text);
+  };
+  CHECK_FALSE(load(folder.path()).cameras[0].pose_sigma);
+  CHECK_FALSE(load(folder.path()).encoder->wheel_radius_sigma);
+
+  append("cam0", "T_BS_sigma: {rotation: 0.002, position: 0.001}\ntimeshift_cam_imu_sigma: 0.0005\n");
+  append("cam1", "T_C0C1_sigma: {rotation: 0.0003, position: 0.00005}\n");
+  append("imu0", "gyroscope_bias_sigma: 0.01\naccelerometer_bias_sigma: 0.2\n");
+  append("encoder0",
+         "T_BS_sigma: {rotation: 0.004, position: 0.003}\nwheel_radius_sigma: 0.0003\n"
+         "wheel_radius_difference_sigma: 0.0001\nwheel_separation_sigma: 0.002\n");
+  append("laser0", "offset_sigma: 0.0015\n");
+  const Calibration c = load(folder.path());
+  REQUIRE(c.cameras[0].pose_sigma);
+  CHECK(c.cameras[0].pose_sigma->rotation == 0.002);
+  CHECK(c.cameras[0].pose_sigma->position == 0.001);
+  REQUIRE(c.cameras[1].pose_sigma);
+  CHECK(c.cameras[1].pose_sigma->position == 0.00005);
+  CHECK(c.camera_time_offset_sigma == 0.0005);
+  CHECK(c.imu.gyro_bias_sigma == 0.01);
+  CHECK(c.imu.accel_bias_sigma == 0.2);
+  REQUIRE(c.encoder->T_BO_sigma);
+  CHECK(c.encoder->T_BO_sigma->rotation == 0.004);
+  CHECK(c.encoder->wheel_radius_sigma == 0.0003);
+  CHECK(c.encoder->wheel_radius_difference_sigma == 0.0001);
+  CHECK(c.encoder->track_width_sigma == 0.002);
+  CHECK(c.lasers->offset_sigma == 0.0015);
+}
+
+TEST_CASE("calibration: standard deviations that cannot be are errors that name file, line and key") {
+  const TempFolder folder;
+  write_full_recording(folder.path());
+  const auto error_with = [&](const char* sensor, const std::string& text) {
+    const fs::path file = folder / sensor / "sensor.yaml";
+    const std::string before = read_text(file);
+    write_text(file, before + "\n" + text + "\n");
+    const std::string error = input_error_of([&] { load(folder.path()); });
+    write_text(file, before);
+    return error;
+  };
+  CHECK(contains(error_with("encoder0", "wheel_radius_sigma: 0"), ": wheel_radius_sigma: '0' is not positive"));
+  CHECK(contains(error_with("encoder0", "wheel_separation_sigma: -0.1"),
+                 "wheel_separation_sigma: '-0.1' is not positive"));
+  CHECK(contains(error_with("imu0", "gyroscope_bias_sigma: .inf"),
+                 "gyroscope_bias_sigma: '.inf' is not a finite number"));
+  CHECK(contains(error_with("laser0", "offset_sigma: .nan"), "offset_sigma: '.nan' is not a finite number"));
+  CHECK(contains(error_with("cam0", "T_BS_sigma: {rotation: 0.1}"), ": T_BS_sigma: {rotation: rad"));
+  CHECK(contains(error_with("cam0", "T_BS_sigma: 0.1"), "T_BS_sigma: keys and values expected"));
+  CHECK(contains(error_with("cam0", "T_BS_sigma: {rotation: 0.1, positon: 0.1}"),
+                 "T_BS_sigma.positon: there is no such"));
+  CHECK(contains(error_with("cam0", "timeshift_cam_imu_sigma: soon"), "'soon' is not a number"));
+  CHECK(contains(error_with("cam1", "T_BS_sigma: {rotation: 0.1, position: 0.1}"), "T_C0C1_sigma"));
+}
+
+TEST_CASE("kalibr: standard deviations beside its values") {
+  const TempFolder folder;
+  write_text(folder / "chain.yaml", kCamchain);
+  replace_in(
+      folder / "chain.yaml", "  cam_overlaps",
+      "  T_cam_imu_sigma: {rotation: 0.002, position: 0.001}\n  timeshift_cam_imu_sigma: 0.0004\n  cam_overlaps");
+  replace_in(folder / "chain.yaml", "cam1:\n", "cam1:\n  T_cn_cnm1_sigma: {rotation: 0.0003, position: 0.00004}\n");
+  write_text(folder / "imu.yaml", kKalibrImu + "gyroscope_bias_sigma: 0.02\n");
+  const Calibration c = load_kalibr(folder / "chain.yaml", folder / "imu.yaml");
+  REQUIRE(c.cameras[0].pose_sigma);
+  CHECK(c.cameras[0].pose_sigma->rotation == 0.002);
+  REQUIRE(c.cameras[1].pose_sigma);
+  CHECK(c.cameras[1].pose_sigma->position == 0.00004);
+  CHECK(c.camera_time_offset_sigma == 0.0004);
+  CHECK(c.imu.gyro_bias_sigma == 0.02);
+}

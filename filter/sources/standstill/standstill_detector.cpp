@@ -21,10 +21,11 @@ void WheelRest::add(const WheelIncrement& turn) {
   }
   any_ = true;
   newest_ns_ = turn.to_ns;
+  interval_ = turn.duration();
 }
 
 std::optional<double> WheelRest::duration(TimeNs t_ns, double max_age) const {
-  if (!any_ || seconds_between(newest_ns_, t_ns) > max_age) return std::nullopt;
+  if (!any_ || seconds_between(newest_ns_, t_ns) > std::max(max_age, 2.0 * interval_)) return std::nullopt;
   return seconds_between(since_ns_, newest_ns_);
 }
 

@@ -17,7 +17,8 @@ namespace ear {
 class WheelRest {
  public:
   void add(const WheelIncrement& turn);
-  /// Do they rest now, and since when? Nothing if the newest reading is older than `max_age` seconds before t_ns.
+  /// Do they rest now, and since when? Nothing if the newest reading is older than `max_age` seconds before t_ns, and
+  /// than two of the intervals in which readings come.
   [[nodiscard]] std::optional<double> duration(TimeNs t_ns, double max_age) const;
   void clear() { any_ = false; }
 
@@ -25,6 +26,7 @@ class WheelRest {
   bool any_ = false;
   TimeNs since_ns_ = 0;
   TimeNs newest_ns_ = 0;
+  double interval_ = 0.0;                            ///< [s] between the last two readings
   Eigen::Vector2d moved_ = Eigen::Vector2d::Zero();  // since since_ns_ [rad]
 };
 

@@ -1,0 +1,112 @@
+// What the calibration states of its own uncertainty becomes the prior of the filter.
+#include "filter/ekf/initial_state.h"
+
+#include <doctest/doctest.h>
+
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <string>
+
+#include "filter/ekf/ekf.h"
+
+using namespace ear;
+
+namespace {
+
+Calibration vehicle() {
+  Calibration calibration;
+  calibration.cameras.resize(2);
+  for (CameraCalibration& camera : calibration.cameras) camera.fu = camera.fv = 400.0;
+  calibration.encoder.emplace();
+  calibration.encoder->wheel_radius = {0.08, 0.08};
+  calibration.encoder->track_width = 0.5;
+  calibration.lasers.emplace();
+  return calibration;
+}
+
+}  // namespace
+
+TEST_CASE("initial state: what is stated replaces the prior, the rest stays") {
+  FilterConfig config;
+  Calibration calibration = vehicle();
+  CHECK(settings_for(config, calibration).prior.wheel_radius == config.prior.wheel_radius);
+  CHECK(settings_for(config, calibration).prior.stereo_rotation == config.prior.stereo_rotation);
+
+  calibration.cameras[0].pose_sigma = PoseSigma{0.011, 0.012};
+  calibration.cameras[1].pose_sigma = PoseSigma{0.013, 0.014};
+  calibration.camera_time_offset_sigma = 0.015;
+  calibration.imu.gyro_bias_sigma = 0.016;
+  calibration.imu.accel_bias_sigma = 0.017;
+  calibration.encoder->T_BO_sigma = PoseSigma{0.018, 0.019};
+  calibration.encoder->wheel_radius_sigma = 8e-4;
+  calibration.encoder->track_width_sigma = 0.01;
+  calibration.lasers->offset_sigma = 0.021;
+  const PriorConfig prior = settings_for(config, calibration).prior;
+  CHECK(prior.camera_rotation == 0.011);
+  CHECK(prior.camera_position == 0.012);
+  CHECK(prior.stereo_rotation == 0.013);
+  CHECK(prior.stereo_position == 0.014);
+  CHECK(prior.time_offset == 0.015);
+  CHECK(prior.gyro_bias == 0.016);
+  CHECK(prior.accel_bias == 0.017);
+  for (const double rotation : {prior.odometer_rotation, prior.odometer_unseen}) CHECK(rotation == 0.018);
+  for (const double position : {prior.axle, prior.axle_unseen}) CHECK(position == 0.019);
+  CHECK(prior.wheel_scale == doctest::Approx(0.01));
+  CHECK(prior.wheel_apart == config.prior.wheel_apart);
+  CHECK(prior.track_width == doctest::Approx(0.02));
+  CHECK(prior.beam_offset == 0.021);
+}
+
+TEST_CASE("initial state: mean and difference of the wheel radii are as well known as stated") {
+  for (const double difference : {1e-5, 4e-4, 1.5e-3}) {
+    CAPTURE(difference);
+    Calibration calibration = vehicle();
+    calibration.encoder->wheel_radius_sigma = 8e-4;
+    calibration.encoder->wheel_radius_difference_sigma = difference;
+    const FilterConfig config = settings_for(FilterConfig{}, calibration);
+    Ekf ekf(config, calibration);
+    Eigen::VectorXd sigma = Eigen::VectorXd::Zero(err::clones);
+    sigma.segment<2>(err::wheel_radius).setConstant(config.prior.wheel_radius);
+    ekf.start(ImuState{}, sigma);
+    const Eigen::Matrix2d P = ekf.covariance().matrix().block<2, 2>(err::wheel_radius, err::wheel_radius);
+    const Eigen::RowVector2d apart(0.08, -0.08), mean(0.04, 0.04);  // [m] of what is relative
+    CHECK(std::sqrt((mean * P * mean.transpose()).value()) == doctest::Approx(8e-4).epsilon(1e-3));
+    CHECK(std::sqrt((apart * P * apart.transpose()).value()) == doctest::Approx(difference).epsilon(1e-3));
+  }
+}
+
+TEST_CASE("initial state: an IMU that is slow has no gap between its samples") {
+  Calibration calibration = vehicle();
+  for (const double rate_hz : {1000.0, 200.0, 50.0}) {
+    calibration.imu.rate_hz = rate_hz;
+    CHECK(settings_for(FilterConfig{}, calibration).max_imu_gap == FilterConfig{}.max_imu_gap);
+  }
+  calibration.imu.rate_hz = 16.0;
+  CHECK(settings_for(FilterConfig{}, calibration).max_imu_gap == doctest::Approx(0.156).epsilon(0.01));
+}
+
+TEST_CASE("initial state: standard deviations that cannot be are named") {
+  using C = Calibration;
+  const auto reason = [](const std::function<void(C&)>& spoil) {
+    C calibration = vehicle();
+    spoil(calibration);
+    try {
+      (void)checked(calibration);
+    } catch (const std::invalid_argument& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  const auto names = [](const std::string& text, const char* field) { return text.find(field) != std::string::npos; };
+  CHECK(reason([](C&) {}).empty());
+  CHECK(names(reason([](C& c) { c.cameras[1].pose_sigma = PoseSigma{0.0, 0.1}; }), "pose_sigma"));
+  CHECK(names(reason([](C& c) { c.camera_time_offset_sigma = -1e-3; }), "camera_time_offset_sigma"));
+  CHECK(names(reason([](C& c) { c.imu.gyro_bias_sigma = std::numeric_limits<double>::quiet_NaN(); }), "gyro_bias"));
+  CHECK(names(reason([](C& c) { c.imu.accel_bias_sigma = std::numeric_limits<double>::infinity(); }), "accel_bias"));
+  CHECK(names(reason([](C& c) { c.encoder->T_BO_sigma = PoseSigma{0.1, -0.1}; }), "T_BO_sigma"));
+  CHECK(names(reason([](C& c) { c.encoder->wheel_radius_sigma = 0.0; }), "wheel_radius_sigma"));
+  CHECK(names(reason([](C& c) { c.encoder->wheel_radius_difference_sigma = 0.0; }), "wheel_radius_difference_sigma"));
+  CHECK(names(reason([](C& c) { c.encoder->track_width_sigma = 0.0; }), "track_width_sigma"));
+  CHECK(names(reason([](C& c) { c.lasers->offset_sigma = 0.0; }), "offset_sigma"));
+}
