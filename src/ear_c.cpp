@@ -110,6 +110,7 @@ ear::EncoderCalibration encoder_of(const ear_calibration& from) {
   encoder.wheel_radius = {from.wheel_radius[0], from.wheel_radius[1]};
   encoder.track_width = from.track_width;
   encoder.noise_counts = from.encoder_noise_counts;
+  encoder.stamp_sigma = from.encoder_stamp_sigma;
   encoder.T_BO_sigma = pose_sigma_of(from.odometer_rotation_sigma, from.odometer_position_sigma);
   encoder.wheel_radius_sigma = sigma_of(from.wheel_radius_sigma);
   encoder.wheel_radius_difference_sigma = sigma_of(from.wheel_radius_difference_sigma);

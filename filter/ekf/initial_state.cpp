@@ -33,6 +33,8 @@ void require_sigmas(const Calibration& calibration) {
   require_sigma(calibration.imu.gyro_bias_sigma, "calibration: gyro_bias_sigma must be positive");
   require_sigma(calibration.imu.accel_bias_sigma, "calibration: accel_bias_sigma must be positive");
   if (const auto& encoder = calibration.encoder) {
+    require(encoder->stamp_sigma >= 0.0 && std::isfinite(encoder->stamp_sigma),
+            "calibration: the encoder's stamp_sigma must not be negative");
     require_sigma(encoder->T_BO_sigma, "calibration: T_BO_sigma must be positive");
     require_sigma(encoder->wheel_radius_sigma, "calibration: wheel_radius_sigma must be positive");
     require_sigma(encoder->wheel_radius_difference_sigma,

@@ -90,6 +90,7 @@ class HealthMonitor {
     std::optional<TimeNs> imu_ns;
     std::optional<TimeNs> refused_imu_ns;  ///< the newest inertial one at the last refused frame
     TimeNs encoder_ns = 0, laser_ns = 0;   ///< newest inertial stamp when they came
+    double encoder_interval = 0.0;         ///< [s] between the last two
     TimeNs tick_ns = 0;
   };
   /// Since when the estimator is what it is.

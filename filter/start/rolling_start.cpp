@@ -1,9 +1,7 @@
 #include "filter/start/rolling_start.h"
 
 #include <cmath>
-#include <vector>
 
-#include "filter/ingest/median.h"
 #include "filter/start/known_gravity.h"
 
 namespace ear {
@@ -36,19 +34,21 @@ struct Sums {
   }
 };
 
-/// How far intervals between readings are from the usual one, as a standard deviation [s]: stamps may be off by that.
-double interval_scatter(const Ring<WheelIncrement>& turns) {
-  constexpr double kSigmaOfMedian = 1.4826;  // of normal values, over the median of their deviations
-  std::vector<double> values;
-  for (std::size_t k = 0; k < turns.size(); ++k) values.push_back(turns[k].duration());
-  const double usual = upper_median(values);
-  for (double& value : values) value = std::abs(value - usual);
-  return kSigmaOfMedian * upper_median(values);
+}  // namespace
+
+Reason lacking_for_rolling_start(const ImuBuffer& imu, const Ring<WheelIncrement>& turns, TimeNs now_ns,
+                                 double min_duration) {
+  if (turns.empty() || seconds_between(turns.back().to_ns, now_ns) > kOldest) return Reason::wheel_gaps;
+  for (std::size_t k = 1; k < turns.size(); ++k) {
+    if (turns[k].from_ns != turns[k - 1].to_ns) return Reason::wheel_gaps;
+  }
+  const TimeNs start_ns = turns.front().from_ns;
+  if (imu.empty() || imu[0].t_ns > start_ns) return Reason::few_samples;
+  return seconds_between(start_ns, turns.back().to_ns) < min_duration ? Reason::few_readings : Reason::none;
 }
 
-/// `scatter` [s]: of the readings' intervals.
-std::optional<ImuState> fit_motion(const ImuBuffer& imu, const Ring<WheelIncrement>& turns,
-                                   const OdometerState& odometer, const RollingStartNoise& noise, double scatter) {
+std::optional<ImuState> rolling_start(const ImuBuffer& imu, const Ring<WheelIncrement>& turns,
+                                      const OdometerState& odometer, const RollingStartNoise& noise) {
   const TimeNs start_ns = turns.front().from_ns;
   Matrix A = Matrix::Zero();
   Vector b = Vector::Zero();
@@ -77,7 +77,7 @@ std::optional<ImuState> fit_motion(const ImuBuffer& imu, const Ring<WheelIncreme
     H.middleCols<3>(kBg) = sums.gained_by_b_g - skew(u) * sums.R_integral;
     H.middleCols<3>(kBa) = -sums.R_integral;
     const Eigen::Vector3d z = u - sums.gained;
-    const double direction = std::hypot(kDirectionSigma, scatter / turn.duration());
+    const double direction = std::hypot(kDirectionSigma, std::sqrt(2.0) * noise.stamp / turn.duration());
     const double sigma = std::hypot(kSpeedSigma, direction * speed);
     A += H.transpose() * H / (sigma * sigma);
     b += H.transpose() * z / (sigma * sigma);
@@ -94,25 +94,6 @@ std::optional<ImuState> fit_motion(const ImuBuffer& imu, const Ring<WheelIncreme
   state.b_g = x.segment<3>(kBg);
   state.b_a = x.segment<3>(kBa);
   return state;
-}
-
-}  // namespace
-
-Reason lacking_for_rolling_start(const ImuBuffer& imu, const Ring<WheelIncrement>& turns, TimeNs now_ns,
-                                 double min_duration) {
-  if (turns.empty() || seconds_between(turns.back().to_ns, now_ns) > kOldest) return Reason::wheel_gaps;
-  for (std::size_t k = 1; k < turns.size(); ++k) {
-    if (turns[k].from_ns != turns[k - 1].to_ns) return Reason::wheel_gaps;
-  }
-  const TimeNs start_ns = turns.front().from_ns;
-  if (imu.empty() || imu[0].t_ns > start_ns) return Reason::few_samples;
-  return seconds_between(start_ns, turns.back().to_ns) < min_duration ? Reason::few_readings : Reason::none;
-}
-
-std::optional<ImuState> rolling_start(const ImuBuffer& imu, const Ring<WheelIncrement>& turns,
-                                      const OdometerState& odometer, const RollingStartNoise& noise) {
-  const std::optional<ImuState> state = fit_motion(imu, turns, odometer, noise, 0.0);
-  return state ? state : fit_motion(imu, turns, odometer, noise, interval_scatter(turns));
 }
 
 }  // namespace ear

@@ -16,6 +16,7 @@ namespace ear {
 struct RollingStartNoise {
   double gyro_bias = 0.1;    ///< [rad/s]
   double accel_bias = 0.05;  ///< [m/s^2]
+  double stamp = 0.0;        ///< [s] of one reading of the wheels
 };
 
 /// A state at the start of the first of `turns`. Least squares over the velocity v and gravity g of that moment, in the
@@ -23,8 +24,7 @@ struct RollingStartNoise {
 ///   R_Bk u_k = v + g t_k + integral of R f,      u_k: the body's velocity that the wheels measure, along the
 ///   odometer's x
 /// It is a point to linearize at, not an estimate: the samples may be used again. Nothing if the turns contradict the
-/// inertial samples, as they do in the air or on slipping wheels, also if their stamps are as uncertain as they are
-/// irregular. They must be all that lacking_for_rolling_start()
+/// inertial samples, as they do in the air or on slipping wheels. They must be all that lacking_for_rolling_start()
 /// asks for.
 [[nodiscard]] std::optional<ImuState> rolling_start(const ImuBuffer& imu, const Ring<WheelIncrement>& turns,
                                                     const OdometerState& odometer, const RollingStartNoise& noise);

@@ -71,7 +71,7 @@ std::optional<StartState> Start::find(const Situation& now, const ImuStatistics&
     lacks = Reason::other_gravity;
   }
   if (!start && now.rolls) {
-    const RollingStartNoise noise{config_.prior.gyro_bias, config_.prior.accel_bias};
+    const RollingStartNoise noise{config_.prior.gyro_bias, config_.prior.accel_bias, calibration_.encoder->stamp_sigma};
     const OdometerState odometer = odometer_state(calibration_);
     lacks = lacking_for_rolling_start(ingest.imu(), ingest.waiting_increments(), now.t_ns, kRollingStart);
     const std::optional<ImuState> x = lacks == Reason::none

@@ -58,6 +58,7 @@ struct EncoderCalibration {
   std::array<double, 2> wheel_radius{0.075, 0.075};  ///< left, right [m]
   double track_width = 0.40;                         ///< [m]
   double noise_counts = 2.0;                         ///< one reading, 1-sigma [count]
+  double stamp_sigma = 0.0;  ///< one reading's stamp [s]: how far its counts may be of another time
   std::optional<PoseSigma> T_BO_sigma;
   std::optional<double> wheel_radius_sigma;             ///< of the mean of both radii [m]
   std::optional<double> wheel_radius_difference_sigma;  ///< of the left radius less the right one [m]

@@ -77,6 +77,7 @@ typedef struct {
   double wheel_radius[2];      /* left, right [m] */
   double track_width;          /* [m] */
   double encoder_noise_counts; /* of one reading, 1-sigma [count] */
+  double encoder_stamp_sigma;  /* of the stamp of one reading [s]; 0: exact */
 
   int32_t beam_count; /* 0: no lasers */
   ear_beam beams[EAR_MAX_BEAMS];

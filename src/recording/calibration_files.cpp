@@ -114,6 +114,7 @@ EncoderCalibration read_encoder(const fs::path& file) {
   encoder.wheel_radius = {radius[0], radius[1]};
   encoder.track_width = map.get<double>("wheel_separation");
   encoder.noise_counts = map.get<double>("noise_counts");
+  encoder.stamp_sigma = map.sigma("stamp_sigma").value_or(0.0);
   encoder.T_BO_sigma = pose_sigma(map, "T_BS_sigma");
   encoder.wheel_radius_sigma = map.sigma("wheel_radius_sigma");
   encoder.wheel_radius_difference_sigma = map.sigma("wheel_radius_difference_sigma");

@@ -299,7 +299,7 @@ TEST_CASE("calibration: standard deviations beside the values") {
   append("imu0", "gyroscope_bias_sigma: 0.01\naccelerometer_bias_sigma: 0.2\n");
   append("encoder0",
          "T_BS_sigma: {rotation: 0.004, position: 0.003}\nwheel_radius_sigma: 0.0003\n"
-         "wheel_radius_difference_sigma: 0.0001\nwheel_separation_sigma: 0.002\n");
+         "wheel_radius_difference_sigma: 0.0001\nwheel_separation_sigma: 0.002\nstamp_sigma: 0.004\n");
   append("laser0", "offset_sigma: 0.0015\n");
   const Calibration c = load(folder.path());
   REQUIRE(c.cameras[0].pose_sigma);
@@ -315,6 +315,7 @@ TEST_CASE("calibration: standard deviations beside the values") {
   CHECK(c.encoder->wheel_radius_sigma == 0.0003);
   CHECK(c.encoder->wheel_radius_difference_sigma == 0.0001);
   CHECK(c.encoder->track_width_sigma == 0.002);
+  CHECK(c.encoder->stamp_sigma == 0.004);
   CHECK(c.lasers->offset_sigma == 0.0015);
 }
 

@@ -62,6 +62,7 @@ Wheels::Sigmas Wheels::noise_of(const WheelRows& rows, const WheelIncrement& inc
   const double count_noise = std::sqrt(2.0) * encoder_.noise_counts * 2.0 * M_PI /
                              static_cast<double>(encoder_.resolution) / dt * x.odometer.wheel_radius.mean() /
                              std::sqrt(2.0);
+  const double stamp_noise = std::sqrt(2.0) * encoder_.stamp_sigma / dt;  // of a speed, relative
   // On springs and tyres the body does not point along its path, and no laser shows by how much.
   const double sway = sees_ground_ ? 0.0 : std::abs(rows.wheel_speed) / std::sqrt(dt);  // [m/s] per [rad sqrt(s)]
   const auto root_sum = [&](int row, std::initializer_list<double> sigmas) {
@@ -72,11 +73,13 @@ Wheels::Sigmas Wheels::noise_of(const WheelRows& rows, const WheelIncrement& inc
   };
   const double floor = config_.speed_sigma;
   Sigmas sigma;
-  sigma << root_sum(WheelRows::speed, {floor, config_.slip * per_root_metre, count_noise}),
+  sigma << root_sum(WheelRows::speed,
+                    {floor, config_.slip * per_root_metre, count_noise, stamp_noise * rows.wheel_speed}),
       root_sum(WheelRows::side,
                {floor, config_.side_slip * per_root_metre, config_.side_slip_turn * yaw_rate, config_.body_yaw * sway}),
       root_sum(WheelRows::slope, {floor, config_.roughness * per_root_metre, config_.body_pitch * sway}),
-      root_sum(WheelRows::yaw_rate, {config_.yaw_rate_sigma, count_noise * 2.0 / x.odometer.track_width});
+      root_sum(WheelRows::yaw_rate,
+               {config_.yaw_rate_sigma, count_noise * 2.0 / x.odometer.track_width, stamp_noise * yaw_rate});
   return sigma;
 }
 
