@@ -438,6 +438,8 @@ TEST_CASE("C interface: what cannot be used is refused with its reason") {
     const auto spoil = [offset](C& c, S&) { c.camera_time_offset = offset; };
     CHECK(reason_of(spoil).find("camera_time_offset") != std::string::npos);
   }
+  CHECK(reason_of([](C& c, S&) { c.wheel_radius_sigma = -1e-3; }).find("wheel_radius_sigma") != std::string::npos);
+  CHECK(reason_of([](C& c, S&) { c.cameras[1].rotation_sigma = 1e-3; }).find("pose_sigma") != std::string::npos);
   CHECK(reason_of([](C&, S& s) { s.window = 1; }).find("filter.window") != std::string::npos);
   CHECK(reason_of([](C&, S& s) { s.frame_slots = 0; }).find("frame_slots") != std::string::npos);
   CHECK(reason_of([](C&, S& s) { s.queue_seconds = std::nan(""); }).find("queue_seconds") != std::string::npos);
@@ -451,6 +453,31 @@ TEST_CASE("C interface: what cannot be used is refused with its reason") {
   CHECK(ear_create(&bad, nullptr, &odometry, nullptr, 0) == EAR_INVALID_ARGUMENT);
   CHECK(ear_create(nullptr, nullptr, &odometry, nullptr, 0) == EAR_INVALID_ARGUMENT);
   CHECK(ear_create(&good, nullptr, nullptr, nullptr, 0) == EAR_INVALID_ARGUMENT);
+}
+
+TEST_CASE("C interface: a start that is given, and why there is no estimate") {
+  const Handle odometry = make();
+  std::array<char, 200> message{};
+  ear_start start{};
+  ear_default_start(&start);
+  CHECK(start.state.q_WB[0] == 1.0);
+  CHECK(start.tilt_sigma == GivenStart{}.tilt_sigma);
+  start.velocity_sigma = 0.0;
+  CHECK(ear_start_at(odometry.get(), &start, message.data(), message.size()) == EAR_INVALID_ARGUMENT);
+  CHECK(std::string(message.data()) == "start: velocity_sigma: must be positive");
+  CHECK(ear_start_at(odometry.get(), nullptr, nullptr, 0) == EAR_INVALID_ARGUMENT);
+  CHECK(ear_start_at(nullptr, &start, nullptr, 0) == EAR_INVALID_ARGUMENT);
+
+  start.velocity_sigma = 0.05;
+  start.state.t_ns = drive().simulation.imu().back().t_ns + 1'000'000'000;
+  start.state.p_WB[0] = 7.0;
+  REQUIRE(ear_start_at(odometry.get(), &start, message.data(), message.size()) == EAR_OK);
+  run(odometry.get(), 1);
+  ear_health health{};
+  REQUIRE(ear_health_of(odometry.get(), &health) == EAR_OK);
+  CHECK(health.status == EAR_HEALTH_INITIALISING);
+  CHECK(std::string(ear_reason_text(health.reason)) == "the time of the start that was given has not come");
+  CHECK(std::string(ear_reason_text(1000)) == "unknown reason");
 }
 
 TEST_CASE("C interface: null is refused everywhere") {

@@ -62,7 +62,10 @@ Wheels::Sigmas Wheels::noise_of(const WheelRows& rows, const WheelIncrement& inc
   const double count_noise = std::sqrt(2.0) * encoder_.noise_counts * 2.0 * M_PI /
                              static_cast<double>(encoder_.resolution) / dt * x.odometer.wheel_radius.mean() /
                              std::sqrt(2.0);
-  const double stamp_noise = std::sqrt(2.0) * encoder_.stamp_sigma / dt;  // of a speed, relative
+  // Of a speed, relative. An interval that seems short makes a speed that is too high: weights in proportion to the
+  // interval leave the mean as it is.
+  const double usual_dt = encoder_.rate_hz > 0.0 ? 1.0 / encoder_.rate_hz : dt;
+  const double stamp_noise = encoder_.stamp_sigma * std::sqrt(2.0 / (usual_dt * dt));
   // On springs and tyres the body does not point along its path, and no laser shows by how much.
   const double sway = sees_ground_ ? 0.0 : std::abs(rows.wheel_speed) / std::sqrt(dt);  // [m/s] per [rad sqrt(s)]
   const auto root_sum = [&](int row, std::initializer_list<double> sigmas) {
