@@ -41,6 +41,19 @@ void note(ContactEvent event, IntervalMeter& meter, Window* window) {
   if (event == ContactEvent::takeoff && window) window->forget_wheels(kTakeoffUnseen);
 }
 
+/// The newest state of the window. `P`: by the window, which does not know of the ground's normal. Its error is counted
+/// from that of the attitude, in the world it turns along.
+void assume_newest(const Window& window, const GroundNormal& normal, Eigen::MatrixXd P, Ekf& ekf) {
+  State x = window.newest();
+  const Eigen::Vector3d n_B = normal.known() ? normal.n_B() : Eigen::Vector3d(x.odometer.T_BO.R.col(2));
+  x.ground.n_W = x.imu.R_WB * n_B;
+  if (normal.known()) {
+    const Eigen::Matrix2d turned = tangent_basis(x.ground.n_W).transpose() * x.imu.R_WB * tangent_basis(n_B);
+    P.block<2, 2>(err::normal, err::normal) = turned * normal.covariance() * turned.transpose();
+  }
+  ekf.assume(x, P);
+}
+
 }  // namespace
 
 Smoother::Smoother(const FilterConfig& config, const Calibration& calibration)
@@ -114,7 +127,7 @@ FrameAgreement Smoother::step(const FeatureFrame& frame, TimeNs t_ns, bool image
     stop();
     return seen;
   }
-  assume_newest(std::move(*P));
+  assume_newest(*window_, meter_.normal(), std::move(*P), ekf_);
   if (use_image) sources_.cameras().remember(frame, ekf_);
   records_.statistics.standing = stands;
   records_.statistics.features_used = window_->features_used();
@@ -122,20 +135,6 @@ FrameAgreement Smoother::step(const FeatureFrame& frame, TimeNs t_ns, bool image
   records_.statistics.clones = static_cast<int>(window_->size());
   window_->make_room();
   return seen;
-}
-
-/// `P`: by the window, which does not know of the ground's normal. Its error is counted from that of the attitude, in
-/// the world it turns along.
-void Smoother::assume_newest(Eigen::MatrixXd P) {
-  State x = window_->newest();
-  const GroundNormal& normal = meter_.normal();
-  const Eigen::Vector3d n_B = normal.known() ? normal.n_B() : Eigen::Vector3d(x.odometer.T_BO.R.col(2));
-  x.ground.n_W = x.imu.R_WB * n_B;
-  if (normal.known()) {
-    const Eigen::Matrix2d turned = tangent_basis(x.ground.n_W).transpose() * x.imu.R_WB * tangent_basis(n_B);
-    P.block<2, 2>(err::normal, err::normal) = turned * normal.covariance() * turned.transpose();
-  }
-  ekf_.assume(x, P);
 }
 
 /// What is given away of the state, and whether it is.
@@ -180,7 +179,7 @@ void Smoother::start(const FeatureFrame& frame, TimeNs t_ns) {
   window_ = std::make_unique<Window>(config_, focal_length(calibration_), ekf_.state(), P);
   meter_.begin(stands);
   records_.statistics.standing = stands;
-  assume_newest(P);
+  assume_newest(*window_, meter_.normal(), P, ekf_);
 }
 
 /// The window came to nothing: it is given up.

@@ -57,7 +57,6 @@ class Smoother final : public Estimator {
   FrameAgreement move_to(const FeatureFrame& frame, bool image);
   void start(const FeatureFrame& frame, TimeNs t_ns);
   FrameAgreement step(const FeatureFrame& frame, TimeNs t_ns, bool image);
-  void assume_newest(Eigen::MatrixXd P);
   void stop();
   [[nodiscard]] std::optional<Estimate> report(bool image, const FrameAgreement& agreement);
 
