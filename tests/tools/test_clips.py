@@ -87,6 +87,11 @@ class Clips(unittest.TestCase):
     def test_hop_by_all_sensors(self):
         self.assertLess(self.position_rmse(self.clip("hop")), 0.015)
 
+    def test_hop_by_one_camera(self):
+        """It stands at first; with wheels and lasers, and with the inertial samples alone."""
+        self.assertLess(self.position_rmse(self.clip("hop"), "--mono"), 0.030)
+        self.assertLess(self.position_rmse(self.clip("hop"), "--mono", "--odometer", "none"), 0.035)
+
     def test_a_car_without_a_camera(self):
         """Its wheels are 0.97 % larger than its calibration says, and its mounting is a guess.
 
