@@ -38,8 +38,8 @@ StandstillDetector::StandstillDetector(const StandstillConfig& config, double fo
 
 bool StandstillDetector::update(const FeatureFrame& frame, const ImuStatistics& imu, const Eigen::Vector3d& gyro_bias,
                                 double max_gyro, std::optional<double> wheel_rest) {
-  const bool imu_quiet = imu.duration > 0.8 * config_.duration && imu.gyro_spread < config_.max_gyro_spread &&
-                         imu.accel_spread < config_.max_accel_spread && (imu.gyro_mean - gyro_bias).norm() < max_gyro;
+  const bool imu_quiet = imu.gyro_spread < config_.max_gyro_spread && imu.accel_spread < config_.max_accel_spread &&
+                         (imu.gyro_mean - gyro_bias).norm() < max_gyro;
   const double max_flow_px = standing_ ? config_.leave_flow_px : config_.max_flow_px;
   const std::optional<double> flow_px = common_flow_px(frame);
   const bool known = flow_px || wheel_rest;
@@ -48,7 +48,8 @@ bool StandstillDetector::update(const FeatureFrame& frame, const ImuStatistics& 
     restart(frame);
     return false;
   }
-  standing_ = seconds_between(since_ns_, frame.t_ns) >= config_.duration;
+  const bool enough_imu = imu.duration > 0.8 * config_.duration;
+  standing_ = enough_imu && seconds_between(since_ns_, frame.t_ns) >= config_.duration;
   if (standing_ && !frame.features.empty()) renew_reference(frame);
   return standing_;
 }
