@@ -35,6 +35,7 @@ double NoiseScore::add(double residual, const Expected& expected, TimeNs t_ns) {
   }
   squares_ += square;
   count_ += 1.0;
+  if (!expected.adapts) return 1.0;
   return expected.supported ? believed * believed : believed;
 }
 

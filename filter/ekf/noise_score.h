@@ -18,6 +18,7 @@ class NoiseScore {
     double state = 0.0;      ///< by the state's error
     double noise = 0.0;      ///< by the sensor's noise, as it usually is
     bool supported = false;  ///< other sensors show the same part of the state
+    bool adapts = true;      ///< false: the noise stays as it usually is
   };
 
   /// A residual at `t_ns`. The factor, at least 1, that the noise's variance is to be multiplied by. What the state

@@ -33,7 +33,7 @@ struct PriorConfig {
   double wheel_scale = 1e-2;        ///< of both wheels alike, relative, where neither camera nor lasers exist
   double track_width = 5e-3;        ///< relative
   double odometer_rotation = 5e-3;  ///< [rad] odometer in the body
-  double odometer_unseen = 5e-2;    ///< [rad] the same without lasers, where it is what was guessed
+  double odometer_unseen = 3e-2;    ///< [rad] the same without lasers, where it is what was guessed
   double axle = 3e-3;               ///< [m] middle of the axle in the body
   double axle_unseen = 0.1;         ///< [m] the same without lasers
   double beam_offset = 2e-3;        ///< [m] range of each laser beam
@@ -60,12 +60,12 @@ enum class OdometerModel : std::uint8_t {
 /// Wheels and lasers. What slips or bumps grows with the square root of the distance: [m] per sqrt(m).
 struct OdometerConfig {
   OdometerModel model = OdometerModel::terrain;
-  bool yaw_rate = false;    ///< the difference of the wheels with OdometerModel::terrain too; always without lasers
-  double slip = 1e-3;       ///< along the track [m/sqrt(m)]
-  double side_slip = 2e-3;  ///< across it [m/sqrt(m)]
+  double slip = 1e-3;            ///< along the track [m/sqrt(m)]
+  double side_slip = 2e-3;       ///< across it [m/sqrt(m)]
   double side_slip_turn = 5e-3;  ///< across it, while turning [m/s per rad/s]
   double roughness = 4e-3;       ///< through the ground [m/sqrt(m)]
-  double body_pitch = 1e-2;      ///< without lasers: the body against its path, up and down [rad sqrt(s)]
+  bool scores = true;            ///< wheels and beams that do not fit weigh less; off in ablations only
+  double body_pitch = 3e-2;      ///< without lasers: the body against its path, up and down [rad sqrt(s)]
   double body_yaw = 2.5e-3;      ///< the same to the sides [rad sqrt(s)]
   double speed_sigma = 1e-3;     ///< [m/s] every row, also of standing wheels
   double yaw_rate_sigma = 0.02;  ///< [rad/s]
@@ -108,7 +108,7 @@ enum class AnomalyWeight : std::uint8_t {
 
 /// Sensors compared over every interval between frames: the paper's III-D; docs/anomaly.md.
 struct AnomalyConfig {
-  bool enabled = false;  ///< weigh down the one at fault; it is named in any case
+  bool enabled = true;  ///< weigh down the one at fault; it is named in any case
   AnomalyScore score = AnomalyScore::mahalanobis;
   AnomalyWeight weight = AnomalyWeight::symmetric;
   double distance = 0.005;    ///< [m] with `distance`: root of the variance (13) that is too much

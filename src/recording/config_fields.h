@@ -103,11 +103,11 @@ EnableFor<C, OnlineCalibrationConfig> visit(C& c, F&& f) {
 template <typename C, typename F>
 EnableFor<C, OdometerConfig> visit(C& c, F&& f) {
   f("model", c.model);
-  f("yaw_rate", c.yaw_rate);
   f("slip", c.slip);
   f("side_slip", c.side_slip);
   f("side_slip_turn", c.side_slip_turn);
   f("roughness", c.roughness);
+  f("scores", c.scores);
   f("body_pitch", c.body_pitch);
   f("body_yaw", c.body_yaw);
   f("speed_sigma", c.speed_sigma);

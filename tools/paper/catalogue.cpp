@@ -162,13 +162,14 @@ TableDefinition table_four(const Texts& wanted) {
 }
 
 TableDefinition table_five(const Texts& wanted) {
-  const Texts configurations{"weights-off", "weights-mahalanobis", "weights-distance"};
-  TableDefinition table{"V",
-                        "Anomaly weights: RMSE of Flat3, start-to-end error of Sway [m]",
-                        "",
-                        {"without", "with"},
-                        {"here, without", "with, Mahalanobis", "with, distance"},
-                        {}};
+  const Texts configurations{"weights-off", "weights-mahalanobis", "weights-distance", "gates-off", "all-off"};
+  TableDefinition table{
+      "V",
+      "Anomaly weights: RMSE of Flat3, start-to-end error of Sway [m]",
+      "",
+      {"without", "with"},
+      {"here, without", "with, Mahalanobis", "with, distance", "with, gates off", "without, gates and scores off"},
+      {}};
   const auto add = [&](const std::string& sequence, const std::string& label, Figure figure, double rate,
                        const Texts& figures) {
     if (!contains(wanted, sequence)) return;

@@ -13,16 +13,6 @@ constexpr double kLevelOff = 0.05;  // [m] chosen: of a plane from the wheels th
 constexpr double kLeanOff = 0.2;    // chosen: sine of the axle's angle to it
 constexpr double kPatience = 0.47;  // [s] chosen: readings that contradict the wheels for so long are accepted
 
-/// Since when has it been so, in a row? Has it been for kPatience?
-bool lasts(bool holds, std::optional<TimeNs>& since_ns, TimeNs t_ns) {
-  if (!holds) {
-    since_ns.reset();
-    return false;
-  }
-  if (!since_ns) since_ns = t_ns;
-  return seconds_between(*since_ns, t_ns) > kPatience;
-}
-
 }  // namespace
 
 Ground::Ground(const FilterConfig& config, const Calibration& calibration)
@@ -49,7 +39,6 @@ void Ground::update(const BeamRanges& reading, const ImuBuffer& imu, CameraUpdat
   if (!known() && !restart(reading, R_WB, ekf)) return;
   const State& x = ekf.state();
   GroundRows<kMaxBeams + 1> z;
-  std::array<Source, kMaxBeams> beam_of{};
   for (std::size_t beam = 0; beam < lasers_->beams.size(); ++beam) {
     const double range = reading.range[beam];
     if (!(range >= lasers_->range_min && range <= lasers_->range_max)) continue;
@@ -60,25 +49,27 @@ void Ground::update(const BeamRanges& reading, const ImuBuffer& imu, CameraUpdat
     z.H(z.count, ground_column(err::beams) + static_cast<int>(beam)) = 1.0;
     z.residual(z.count) = range - predicted.range;
     z.sigma(z.count) = std::hypot(lasers_->noise, config_.unevenness);
-    beam_of[static_cast<std::size_t>(z.count++)] = beam_source(beam);
+    const Innovation innovation = weigh(z, running_.beam[beam], reading.t_ns, ekf);
+    records.log.add(beam_source(beam), innovation, reading.t_ns);
+    ++(innovation.fits ? records.statistics.beams_used : records.statistics.beams_rejected);
   }
-  const int beams = z.count;
   const AxlePrediction axle = predict_axle(x, R_WB);
   z.H.row(z.count).segment<2>(ground_column(err::normal)) = axle.H_normal;
   z.residual(z.count) = -axle.lean;
-  z.sigma(z.count++) = std::sqrt(2.0) * config_.unevenness / x.odometer.track_width;
-  ekf.apply(z, 1.0, calibration, [&](int row, const Innovation& innovation) {
-    if (row == beams) return axle_fits(innovation, reading.t_ns);
-    records.log.add(beam_of[static_cast<std::size_t>(row)], innovation, reading.t_ns);
-    ++(innovation.fits ? records.statistics.beams_used : records.statistics.beams_rejected);
-    return innovation.fits;
-  });
+  z.sigma(z.count) = std::sqrt(2.0) * config_.unevenness / x.odometer.track_width;
+  weigh(z, running_.axle, reading.t_ns, ekf);
+  ekf.apply(z, 1.0, calibration, [](int, const Innovation&) { return true; });
 }
 
-/// The axle stands on the ground. Where it seems not to for long, it is the plane that is wrong.
-bool Ground::axle_fits(const Innovation& lean, TimeNs t_ns) {
-  if (lasts(!lean.fits, running_.leaning_since_ns, t_ns)) running_ = Running{};
-  return lean.fits;
+/// The newest row's noise grows with what did not fit. Nothing else shows the ground: where all beams contradict it,
+/// it is the plane that is wrong, and what pull they keep brings it back.
+Innovation Ground::weigh(GroundRows<kMaxBeams + 1>& z, NoiseScore& score, TimeNs t_ns, const Ekf& ekf) const {
+  const int row = z.count++;
+  const Innovation innovation = ekf.test(z.H.row(row), z.residual(row), z.sigma(row));
+  const double noise = z.sigma(row) * z.sigma(row);
+  z.sigma(row) *=
+      std::sqrt(score.add(innovation.value, {innovation.variance - noise, noise, false, config_.scores}, t_ns));
+  return innovation;
 }
 
 /// Where nothing is known of the ground, the plane through the hits is where the linearisation starts (2), (3). The
@@ -91,7 +82,8 @@ bool Ground::restart(const BeamRanges& reading, const Eigen::Matrix3d& R_WB, Ekf
   if (!plane) return true;
   const bool carries = std::abs(plane->height - o.wheel_radius.mean()) < kLevelOff &&
                        std::abs(plane->n_B.dot(o.T_BO.R.col(1))) < kLeanOff;
-  if (!carries && !lasts(true, running_.misplaced_since_ns, reading.t_ns)) return false;
+  if (!running_.misplaced_since_ns) running_.misplaced_since_ns = reading.t_ns;
+  if (!carries && seconds_between(*running_.misplaced_since_ns, reading.t_ns) < kPatience) return false;
   ekf.restart_normal(carries ? Eigen::Vector3d((R_WB * plane->n_B).normalized()) : Eigen::Vector3d::UnitZ());
   running_.misplaced_since_ns.reset();
   running_.known = true;

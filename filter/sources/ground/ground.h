@@ -2,12 +2,14 @@
 // Contact is decided in contact.h, the rows are in ground_rows.h. docs/filter.md, "Ground".
 #pragma once
 
+#include <array>
 #include <bitset>
 #include <optional>
 
 #include "ear/calibration.h"
 #include "ear/filter_config.h"
 #include "filter/ekf/ekf.h"
+#include "filter/ekf/noise_score.h"
 #include "filter/ekf/records.h"
 #include "filter/ingest/beam_ranges.h"
 #include "filter/ingest/imu_buffer.h"
@@ -44,12 +46,13 @@ class Ground {
  private:
   ContactEvent note(ContactEvent event);
   bool restart(const BeamRanges& reading, const Eigen::Matrix3d& R_WB, Ekf& ekf);
-  [[nodiscard]] bool axle_fits(const Innovation& lean, TimeNs t_ns);
+  Innovation weigh(GroundRows<kMaxBeams + 1>& z, NoiseScore& score, TimeNs t_ns, const Ekf& ekf) const;
 
   struct Running {
+    std::array<NoiseScore, kMaxBeams> beam;
+    NoiseScore axle;  ///< that it lies along the ground
     bool known = false;
     std::optional<TimeNs> misplaced_since_ns;  ///< readings whose plane the wheels do not stand on
-    std::optional<TimeNs> leaning_since_ns;    ///< readings with an axle that does not lie along the ground
   };
 
   OdometerConfig config_;

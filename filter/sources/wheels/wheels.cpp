@@ -24,10 +24,7 @@ void Wheels::update(const WheelIncrement& increment, const Context& context, Ekf
   Sigmas sigma = noise_of(rows, increment, rate, x);
   score_wheels(rows, sigma, increment.to_ns, context.supported, ekf, records);
 
-  // Without lasers, roll and the gyroscope's bias are set apart by nothing else: both turn the path sideways.
-  const bool terrain = config_.model == OdometerModel::terrain;
-  const bool use_yaw_rate =
-      config_.model == OdometerModel::differential || config_.yaw_rate || (terrain && !sees_ground_);
+  const bool use_yaw_rate = config_.model != OdometerModel::gyro;
   const std::array<bool, WheelRows::size> use = {true, true, !uses_plane() || context.ground_known, use_yaw_rate};
   GroundRows<WheelRows::size> z;
   for (int row = 0; row < WheelRows::size; ++row) {
@@ -37,8 +34,8 @@ void Wheels::update(const WheelIncrement& increment, const Context& context, Ekf
       if (row == WheelRows::slope && !innovation.fits) running_.lifted_ns = increment.to_ns;
       NoiseScore& score = running_.row[static_cast<std::size_t>(row)];
       const double noise = sigma(row) * sigma(row);
-      sigma(row) *= std::sqrt(
-          score.add(innovation.value, {innovation.variance - noise, noise, context.supported}, increment.to_ns));
+      sigma(row) *= std::sqrt(score.add(
+          innovation.value, {innovation.variance - noise, noise, context.supported, config_.scores}, increment.to_ns));
       count(score, records.statistics);
     }
     z.H.row(z.count) = rows.H.row(row);
@@ -101,7 +98,8 @@ void Wheels::score_wheels(WheelRows& rows, Sigmas& sigma, TimeNs t_ns, bool supp
         ekf.test(H, rows.residual(WheelRows::speed) + side * rows.residual(WheelRows::yaw_rate), noise);
     NoiseScore& score = running_.wheel[i];
     information[i] =
-        1.0 / score.add(innovation.value, {innovation.variance - noise * noise, noise * noise, supported}, t_ns);
+        1.0 / score.add(innovation.value,
+                        {innovation.variance - noise * noise, noise * noise, supported, config_.scores}, t_ns);
     innovation.fits = score.fits();
     records.log.add(i == 0 ? Source::wheel_left : Source::wheel_right, innovation, t_ns);
     count(score, records.statistics);

@@ -39,6 +39,19 @@ std::vector<Configuration> anomaly_weights() {
           with("weights-distance", "anomaly weights, distance", weights(true, AnomalyScore::distance))};
 }
 
+// What keeps out readings that do not fit: the gates, and what weighs the sensors.
+std::vector<Configuration> without_gates() {
+  const auto gates_off = [](bool weighs) {
+    return [=](Config& c) {
+      c.filter.gate_probability = 1.0 - 1e-9;  // as good as none
+      c.filter.huber_px = 1e3;
+      c.filter.odometer.scores = c.filter.anomaly.enabled = weighs;
+    };
+  };
+  return {with("gates-off", "gates off", gates_off(true)),
+          with("all-off", "gates, scores and anomaly weights off", gates_off(false))};
+}
+
 // One ingredient less, or another one in its place.
 std::vector<Configuration> left_out() {
   constexpr double kNothing = 1e3;  // [m/sqrt(m)] a noise that makes a row say nothing
@@ -66,7 +79,7 @@ std::vector<Configuration> left_out() {
 
 std::vector<Configuration> all_configurations() {
   std::vector<Configuration> all{with("default", "all sensors", [](Config&) {})};
-  for (const auto& more : {odometer_models(), anomaly_weights(), left_out()}) {
+  for (const auto& more : {odometer_models(), anomaly_weights(), without_gates(), left_out()}) {
     all.insert(all.end(), more.begin(), more.end());
   }
   all.push_back({"smoother", "smoother", Config{}, Estimator::smoother});
@@ -109,9 +122,9 @@ const std::vector<Configuration>& configurations() {
 
 const std::vector<std::string>& ablation() {
   static const std::vector<std::string> kNames{
-      "default",          "none",         "no-pitch-rate", "no-lasers",
-      "beams-together",   "no-side-slip", "weights-off",   "weights-mahalanobis",
-      "weights-distance", "oldest-clone", "no-prediction"};
+      "default",      "none",         "no-pitch-rate",       "no-lasers",        "beams-together",
+      "no-side-slip", "weights-off",  "weights-mahalanobis", "weights-distance", "gates-off",
+      "all-off",      "oldest-clone", "no-prediction"};
   return kNames;
 }
 
