@@ -150,7 +150,7 @@ double largest(const std::vector<double>& values) {
 /// Over the seeds.
 struct FaultRow {
   std::string fault, sequence;
-  std::vector<double> clean = {}, ate = {}, ratio = {}, said = {}, content = {}, lost = {};
+  std::vector<double> clean = {}, ate = {}, ratio = {}, said = {}, content = {}, lost = {}, untrue = {};
   int unnoticed = 0;
   int never_content = 0;
 
@@ -162,6 +162,7 @@ struct FaultRow {
       ratio.push_back(ate.back() / clean.back());
     }
     lost.push_back(faulty.log.lost);
+    untrue.push_back(faulty.figures.false_tracking.value_or(0.0));
     if (const auto t = said_after(faulty.log, what)) {
       said.push_back(*t);
     } else {
@@ -176,10 +177,10 @@ struct FaultRow {
 
   void print() const {
     if (lost.empty()) return;
-    std::printf("| `%s` | %s | %.4f | %.4f | %.2f / %.2f | %.2f / %.2f | %d | %.1f / %.1f | %d | %.1f |\n",
+    std::printf("| `%s` | %s | %.4f | %.4f | %.2f / %.2f | %.2f / %.2f | %d | %.1f / %.1f | %d | %.1f | %.1f |\n",
                 fault.c_str(), sequence.c_str(), median(clean), median(ate), median(ratio), largest(ratio),
                 median(said), largest(said), unnoticed, median(content), largest(content), never_content,
-                largest(lost));
+                largest(lost), largest(untrue));
   }
 };
 
@@ -235,7 +236,7 @@ void compare_faults(const std::vector<simulator::Options>& simulations, const st
       "| fault | sequence | ATE without [m] | with [m] | ratio, median / worst | said after [s], median / worst | "
       "never "
       "| content after its end [s], median / worst | never | lost for [s] "
-      "|\n|---|---|---|---|---|---|---|---|---|---|\n");
+      "| false tracking [%%] |\n|---|---|---|---|---|---|---|---|---|---|---|\n");
   for (std::size_t f = 0; f < faults.size(); ++f) {
     std::vector<FaultRow> rows;
     for (std::size_t i = 0; i < simulations.size(); ++i) {

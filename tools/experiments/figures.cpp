@@ -80,6 +80,7 @@ void take_errors(const evaluation::Evaluation& evaluation, Figures& figures) {
   figures.rotation_rmse = kDegPerRad * evaluation.rotation_rmse;
   figures.start_to_end = evaluation.start_to_end.error;
   take_nees(evaluation, figures);
+  if (evaluation.false_tracking) figures.false_tracking = 100.0 * evaluation.false_tracking->share;
   if (evaluation.terrain) take_terrain(*evaluation.terrain, figures);
 }
 

@@ -33,6 +33,7 @@ struct Figures {
   std::optional<double> slope_across_inside;  ///< the same
   std::optional<double> mode_agreement;       ///< share of the poses that agree with the truth on ground or air [%]
   std::optional<double> coverage;             ///< frames with an estimate [%]
+  std::optional<double> false_tracking;       ///< time far off while the health says "tracking" [%]
   std::optional<double> features_rejected;    ///< share of the features tried [%]
   std::optional<double> wheel_rows_rejected;  ///< share of the odometer's rows [%]
   std::optional<double> beams_rejected;       ///< share of the laser ranges [%]

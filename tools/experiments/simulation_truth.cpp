@@ -40,6 +40,7 @@ void append(evaluation::Estimate& to, const Estimate& estimate) {
       block(estimate_error::rotation, estimate_error::position),
       block(estimate_error::rotation, estimate_error::rotation);
   to.covariance.push_back(P);
+  to.health.emplace_back(estimate.health.status == HealthStatus::tracking ? "tracking" : "degraded");
   evaluation::TerrainEstimate ground;
   ground.on_ground = estimate.frame.on_ground;
   const TerrainEstimate& terrain = estimate.terrain;

@@ -25,7 +25,7 @@ struct NamedField {
   Field field;
 };
 
-constexpr std::array<NamedField, 21> kFields{{
+constexpr std::array<NamedField, 22> kFields{{
     {"length_m", &Figures::length},
     {"ate_rmse_m", &Figures::ate_rmse},
     {"ate_percent", &Figures::ate_percent},
@@ -43,6 +43,7 @@ constexpr std::array<NamedField, 21> kFields{{
     {"slope_across_inside_percent", &Figures::slope_across_inside},
     {"mode_agreement_percent", &Figures::mode_agreement},
     {"coverage_percent", &Figures::coverage},
+    {"false_tracking_percent", &Figures::false_tracking},
     {"features_rejected_percent", &Figures::features_rejected},
     {"wheel_rows_rejected_percent", &Figures::wheel_rows_rejected},
     {"beams_rejected_percent", &Figures::beams_rejected},
@@ -57,7 +58,7 @@ struct Column {
 
 double median_of(const Values& values) { return median(values); }
 
-constexpr std::array<Column, 23> kColumns{{
+constexpr std::array<Column, 24> kColumns{{
     {"length [m]", &Figures::length, median_of},
     {"ATE [m]", &Figures::ate_rmse, median_of},
     {"worst", &Figures::ate_rmse, worst},
@@ -77,6 +78,7 @@ constexpr std::array<Column, 23> kColumns{{
     {"in 3 sigma [%]", &Figures::slope_across_inside, mean},
     {"mode right [%]", &Figures::mode_agreement, mean},
     {"coverage [%]", &Figures::coverage, mean},
+    {"false tracking [%]", &Figures::false_tracking, mean},
     {"features rejected [%]", &Figures::features_rejected, mean},
     {"wheel rows", &Figures::wheel_rows_rejected, mean},
     {"beams", &Figures::beams_rejected, mean},
