@@ -214,6 +214,7 @@ void write_health(const ear::Health& from, ear_health& to) {
   to.vertical_sigma = from.vertical_sigma;
   to.reset_counter = from.reset_counter;
   to.load_step = from.load_step;
+  to.imprecise = from.imprecise ? 1 : 0;
 }
 
 ear::GivenStart start_of(const ear_start& from) {
@@ -439,7 +440,7 @@ ear_result ear_health_of(const ear_odometry* odometry, ear_health* health) {
 }
 
 const char* ear_reason_text(ear_reason reason) {
-  return reason < 0 || reason > static_cast<ear_reason>(ear::Reason::clock_or_gap)
+  return reason < 0 || reason > static_cast<ear_reason>(ear::Reason::proving)
              ? "unknown reason"
              : ear::to_text(static_cast<ear::Reason>(reason));
 }

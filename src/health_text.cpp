@@ -61,6 +61,8 @@ const char* to_text(Reason reason) {
       return "the state is not a number";
     case Reason::clock_or_gap:
       return "no inertial samples for two seconds, or their clock was set back";
+    case Reason::proving:
+      return "what is measured fits again, but not yet for half a second";
   }
   return "";
 }
@@ -90,6 +92,7 @@ std::string to_text(const Health& health) {
     text += separator + std::string(kSourceNames[source]);
     separator = ", ";
   }
+  if (health.imprecise) text += std::string(health.faulty.any() ? ", " : ": ") + "position imprecise";
   return text + "; carried by " + to_text(health.aiding);
 }
 

@@ -16,6 +16,9 @@ constexpr double kUnaided = 2.0;          // [s] chosen: that inertia alone may 
 constexpr double kWorstVelocity = 1.0;    // [m/s] chosen: standard deviation of a velocity that is known,
 constexpr double kWorstDirection = 0.2;  // [rad] or of its direction, if more: one that is fast need not know it better
 constexpr double kContradicted = 1.0;    // [s] chosen
+constexpr double kProof = 0.5;           // [s] chosen: for which an estimate that was lost must fit to be given again
+constexpr double kPrecise = 0.05;        // of the path: two standard deviations of the position, while tracking,
+constexpr double kPreciseEnough = 0.1;   // [m] or this, if more
 constexpr double kFastest = 100.0;       // [m/s] chosen: no vehicle with wheels and rotors is faster
 
 constexpr int kFullQuality = 100;  // of a vehicle that stands; Health::quality
@@ -136,6 +139,7 @@ void HealthMonitor::add_frame(const Frame& frame, const std::array<SourceRecord,
   faults_[index_of(Source::gyroscope)].add(rotation_.differs(), t_ns);
   faults_[index_of(Source::accelerometer)].add(false, t_ns);
 
+  if (before.running && frame.running) life_.travelled += frame.speed * seconds_between(before.t_ns, t_ns);
   health_.sources = records;
   health_.horizontal_sigma = frame.horizontal_sigma;
   health_.vertical_sigma = frame.vertical_sigma;
@@ -197,9 +201,10 @@ void HealthMonitor::decide(TimeNs t_ns) {
   health_.aiding = aiding_at(t_ns);
   if (health_.aiding != Aiding::none) life_.aided_ns = t_ns;
   const bool fresh = seconds_between(last_.t_ns, t_ns) < kStale;
-  const bool off =
-      fresh && images_.come(t_ns) && last_.statistics.tracks >= kFewTracks && last_.agreement.left > kMostOff;
+  const bool off = fresh && images_.come(t_ns) &&
+                   ((last_.statistics.tracks >= kFewTracks && last_.agreement.left > kMostOff) || images_.misfit());
   if (!off || (fresh && wheels_carry(last_.statistics))) life_.fitting_ns = t_ns;
+  if (off || health_.aiding == Aiding::none || !last_.running) life_.doubtful_ns = t_ns;
   life_.contradicted = last_.running && seconds_between(life_.fitting_ns, t_ns) > kContradicted;
 
   health_.faulty.reset();
@@ -211,10 +216,14 @@ void HealthMonitor::decide(TimeNs t_ns) {
   }
   const bool usable = last_.running && last_.possible && seconds_between(life_.aided_ns, t_ns) < kUnaided &&
                       velocity_known() && !life_.contradicted;
-  const HealthStatus status = !life_.started         ? HealthStatus::initialising
-                              : !usable              ? HealthStatus::lost
-                              : health_.faulty.any() ? HealthStatus::degraded
-                                                     : HealthStatus::tracking;
+  const bool proven = !lost() || seconds_between(life_.doubtful_ns, t_ns) >= kProof;
+  const double sigma = std::max(health_.horizontal_sigma, health_.vertical_sigma);
+  health_.imprecise = 2.0 * sigma > std::max(kPreciseEnough, kPrecise * life_.travelled);
+  const bool sound = !health_.faulty.any() && !health_.imprecise;
+  const HealthStatus status = !life_.started       ? HealthStatus::initialising
+                              : !usable || !proven ? HealthStatus::lost
+                              : !sound             ? HealthStatus::degraded
+                                                   : HealthStatus::tracking;
   if (status != health_.status) health_.since_ns = t_ns;
   if (health_.status == HealthStatus::lost && status != HealthStatus::lost) ++health_.reset_counter;
   health_.status = status;
@@ -229,7 +238,8 @@ Reason HealthMonitor::reason(TimeNs t_ns) const {
   if (!life_.started) return Reason::vague_velocity;
   if (!last_.possible) return Reason::not_a_number;
   if (life_.contradicted) return Reason::images_contradict;
-  return seconds_between(life_.aided_ns, t_ns) < kUnaided ? Reason::velocity_lost : Reason::inertia_alone;
+  if (seconds_between(life_.aided_ns, t_ns) >= kUnaided) return Reason::inertia_alone;
+  return velocity_known() ? Reason::proving : Reason::velocity_lost;
 }
 
 int HealthMonitor::quality(const Frame& frame) const {

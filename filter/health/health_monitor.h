@@ -98,8 +98,10 @@ class HealthMonitor {
     bool started = false;
     bool any_frame = false;  ///< with an image or without
     TimeNs aided_ns = 0;
-    TimeNs fitting_ns = 0;  ///< when something last did not contradict the state
+    TimeNs fitting_ns = 0;   ///< when something last did not contradict the state
+    TimeNs doubtful_ns = 0;  ///< while lost: when nothing carried the estimate, or the images contradicted it
     bool contradicted = false;
+    double travelled = 0.0;  ///< [m]
   };
 
   std::size_t beams_;

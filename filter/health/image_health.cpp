@@ -1,6 +1,7 @@
 #include "filter/health/image_health.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace ear {
 namespace {
@@ -12,6 +13,7 @@ constexpr double kFewStereo = 0.25;     // chosen: of the features; less are see
 constexpr int kFewTracks = 10;          // chosen
 constexpr double kSparse = 0.4;         // chosen: of the usual number of features
 constexpr double kTracksMemory = 20.0;  // [s] chosen
+constexpr double kFitMemory = 1.0;      // [s] chosen
 constexpr double kSilent = 0.12;        // [s] chosen: without a frame,
 constexpr double kMissedFrames = 2.5;   // chosen: and so many of its intervals
 constexpr double kSlowest = 0.5;        // [s] longer intervals are outages
@@ -49,8 +51,11 @@ void ImageHealth::judge(const Image& image) {
   const double share = std::max(interval_ / kTracksMemory, 1.0 / (1.0 + counted_));
   usual_tracks_ += share * (tracks - usual_tracks_);
   ++counted_;
-  carrying_.add(blind || (known && seen.left > kManyOff), image.t_ns);
-  left_.add(poor || (known && seen.left > kSomeOff), image.t_ns);
+  const double kept = std::exp(-interval_ / kFitMemory);
+  used_ = kept * used_ + image.statistics.features_used;
+  rejected_ = kept * rejected_ + image.statistics.features_rejected;
+  carrying_.add(blind || misfit() || (known && seen.left > kManyOff), image.t_ns);
+  left_.add(poor || misfit() || (known && seen.left > kSomeOff), image.t_ns);
   if (cameras_ == 2 && !seen.right_skipped) {
     const bool one_eyed = image.statistics.stereo < kFewStereo * tracks;
     right_.add(poor || one_eyed || (known && seen.right > kSomeOff), image.t_ns);
@@ -69,6 +74,8 @@ void ImageHealth::report(TimeNs t_ns) {
   if (cameras_ > 1) right_.report(t_ns);
   carrying_.report(t_ns);
 }
+
+bool ImageHealth::misfit() const { return rejected_ > used_ && used_ + rejected_ >= kFewTracks; }
 
 bool ImageHealth::come(TimeNs t_ns) const {
   return cameras_ > 0 && arrival_ns_ &&

@@ -42,6 +42,8 @@ class ImageHealth {
   /// Do the images carry the estimate? They may where some of what they show is wrong, and where they come late but
   /// fit.
   [[nodiscard]] bool carry() const { return carrying_.sound() || late_; }
+  /// Did the gate refuse most features of the last second? With one camera nothing else shows a state that is wrong.
+  [[nodiscard]] bool misfit() const;
   [[nodiscard]] const FaultState& left() const { return left_; }
   [[nodiscard]] const FaultState& right() const { return right_; }
 
@@ -59,7 +61,8 @@ class ImageHealth {
   std::optional<TimeNs> arrival_ns_;  ///< the newest inertial stamp when the last one came
   double interval_ = 0.0;             ///< [s] usual
   double usual_tracks_ = 0.0;
-  int counted_ = 0;  ///< of those
+  int counted_ = 0;                     ///< of those
+  double used_ = 0.0, rejected_ = 0.0;  ///< features, recent ones
 };
 
 }  // namespace ear

@@ -14,7 +14,7 @@ namespace ear {
 enum class HealthStatus : std::uint8_t {
   initialising,  ///< there was no estimate yet
   tracking,      ///< no sensor is faulty; some may be rightly silent, as wheels are in flight
-  degraded,      ///< the estimate may be used, but rests on fewer sensors than it should
+  degraded,      ///< the estimate may be used, but rests on fewer sensors than it should, or is imprecise
   lost           ///< there was an estimate; now it may be anywhere, and none is given
 };
 
@@ -40,7 +40,8 @@ enum class Reason : std::uint8_t {
   velocity_lost,      ///< the velocity's standard deviation is too large
   images_contradict,  ///< for a second, images do not show what the state expects, and no wheels agree with it
   not_a_number,       ///< the state or its covariance is not finite, or has a negative variance
-  clock_or_gap        ///< two seconds without inertial samples, or their clock was set back
+  clock_or_gap,       ///< two seconds without inertial samples, or their clock was set back
+  proving             ///< what is measured fits again, but not yet for half a second
 };
 
 /// What can be wrong by itself.
@@ -88,8 +89,9 @@ struct Health {
   TimeNs since_ns = 0;               ///< when the status began (IMU time)
   SourceSet faulty;                  ///< sources that the estimate should rest on, and does not
   std::array<TimeNs, kSourceCount> onset_ns{};  ///< of these: since when
-  Aiding aiding = Aiding::none;                 ///< what is left
-  int quality = 0;                              ///< 0 (lost) ... 100
+  bool imprecise = false;          ///< two standard deviations of the position are more than 5 % of the path and 0.1 m
+  Aiding aiding = Aiding::none;    ///< what is left
+  int quality = 0;                 ///< 0 (lost) ... 100
   double horizontal_sigma = 0.0;   ///< [m] standard deviation of the position since the start, in the worst direction
   double vertical_sigma = 0.0;     ///< [m]
   std::uint8_t reset_counter = 0;  ///< grows when the pose goes on with a jump: after `lost`

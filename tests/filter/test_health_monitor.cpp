@@ -84,13 +84,13 @@ TEST_CASE("health: a sound vehicle is tracked") {
   Drive drive;
   CHECK(drive.health().status == HealthStatus::initialising);
   CHECK(drive.health().quality == 0);
-  drive.frame.horizontal_sigma = 0.1;
+  drive.frame.horizontal_sigma = 0.04;
   drive.go_on(2.0);
   CHECK(drive.health().status == HealthStatus::tracking);
   CHECK(drive.health().faulty.none());
   CHECK(drive.health().aiding == Aiding::cameras_and_wheels);
   CHECK(drive.health().quality == 100);
-  CHECK(drive.health().horizontal_sigma == 0.1);
+  CHECK(drive.health().horizontal_sigma == 0.04);
   CHECK(drive.health().reset_counter == 0);
 }
 
@@ -284,6 +284,68 @@ TEST_CASE("health: images that contradict the state for a second, and no wheels:
   drive.go_on(0.5);
   CHECK(drive.health().status == HealthStatus::lost);
   CHECK(drive.monitor.contradicted());
+}
+
+TEST_CASE("health: two standard deviations of more than 0.1 m and 5 % of the path are not tracking") {
+  Drive drive;
+  drive.frame.speed = 1.0;
+  drive.go_on(4.0);
+  for (double* const sigma : {&drive.frame.horizontal_sigma, &drive.frame.vertical_sigma}) {
+    *sigma = 0.2;
+    drive.go_on(0.1);
+    CHECK(drive.health().status == HealthStatus::degraded);
+    CHECK(drive.health().imprecise);
+    CHECK(drive.health().faulty.none());
+    *sigma = 0.0;
+    drive.go_on(0.1);
+    CHECK(drive.health().status == HealthStatus::tracking);
+  }
+  drive.frame.horizontal_sigma = 0.2;
+  drive.go_on(3.0);
+  CHECK(drive.health().imprecise);  // 7.2 m
+  drive.go_on(1.5);
+  CHECK_FALSE(drive.health().imprecise);  // 8.7 m
+  CHECK(drive.health().status == HealthStatus::tracking);
+}
+
+TEST_CASE("health: what was lost must fit for half a second before it is given again") {
+  Drive drive;
+  drive.go_on(1.0);
+  drive.frame.velocity_sigma = 2.0;
+  drive.go_on(0.5);
+  REQUIRE(drive.health().status == HealthStatus::lost);
+  drive.frame.statistics.tracks = 0;  // nothing carries it
+  drive.frame.statistics.wheel_rows_used = 0;
+  drive.go_on(0.2);
+  drive.frame.velocity_sigma = 0.0;
+  drive.frame.statistics.tracks = 100;
+  drive.frame.statistics.wheel_rows_used = 15;
+  drive.go_on(0.4);
+  CHECK(drive.health().status == HealthStatus::lost);
+  drive.go_on(0.3);
+  CHECK(drive.monitor.usable());
+  CHECK(drive.health().reset_counter == 1);
+}
+
+TEST_CASE("health: one camera whose features the gate refuses contradicts the state") {
+  Calibration calibration = vehicle();
+  calibration.cameras.resize(1);
+  Drive drive;
+  drive.monitor = HealthMonitor(calibration, false, false);
+  drive.frame.statistics.stereo = 0;
+  drive.frame.statistics.on_ground = false;
+  drive.frame.statistics.wheel_rows_used = 0;
+  drive.frame.agreement = {};
+  drive.frame.statistics.features_used = 5;
+  drive.frame.statistics.features_rejected = 2;
+  drive.go_on(2.0);
+  REQUIRE(drive.health().status == HealthStatus::tracking);
+  drive.frame.statistics.features_used = 1;
+  drive.frame.statistics.features_rejected = 6;
+  drive.go_on(1.5);
+  CHECK(drive.health().faulty[index_of(Source::camera_left)]);
+  drive.go_on(1.5);
+  CHECK(drive.health().status == HealthStatus::lost);
 }
 
 TEST_CASE("health: what is not a number, or a velocity that may be anything, is lost") {

@@ -162,7 +162,9 @@ TEST_CASE("health: a state that is wrong is found out, and begins anew where it 
   for (const Step& step : steps) was_lost = was_lost || step.health.status == HealthStatus::lost;
   CHECK(was_lost);
   REQUIRE(steps.back().now);
-  CHECK(steps.back().health.status == HealthStatus::tracking);
+  CHECK(steps.back().health.status == HealthStatus::degraded);
+  CHECK(steps.back().health.faulty.none());
+  CHECK(steps.back().health.imprecise);  // nothing shows again where it was
   CHECK(steps.back().health.reset_counter >= 1);
   CHECK(position_distance(*steps.back().now) < 4.0);
   const Eigen::Matrix<double, estimate_error::size, estimate_error::size>& P = steps.back().now->estimate.covariance;

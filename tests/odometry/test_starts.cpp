@@ -314,7 +314,7 @@ TEST_CASE("start: why there is none, in words") {
   CHECK(run(standing, vehicle).reason == Reason::none);
 
   CHECK(to_text(Health{}) == "initialising: no image came, and no step was asked for, that inertial samples reach");
-  for (int i = 1; i <= static_cast<int>(Reason::clock_or_gap); ++i) {
+  for (int i = 1; i <= static_cast<int>(Reason::proving); ++i) {
     CHECK(std::string(to_text(static_cast<Reason>(i))).size() > 10);
   }
 }
