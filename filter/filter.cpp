@@ -6,7 +6,7 @@
 
 #include "filter/ekf/initial_state.h"
 #include "filter/ekf/propagation.h"
-#include "filter/health/advise.h"
+#include "filter/health/consistency.h"
 #include "filter/intake.h"
 #include "filter/report.h"
 
@@ -128,7 +128,7 @@ void Filter::start(const FeatureFrame& frame) {
   const bool lost = ekf_.running();
   const CameraState given = camera_state(calibration_);  // what was learned may be as wrong as the rest
   const TimeNs t_ns = imu_time(frame.t_ns, given);
-  const ImuStatistics recent = sources_.standstill().recent(ingest_.imu(), t_ns);
+  const ImuStatistics recent = lost ? ImuStatistics{} : sources_.standstill().recent(ingest_.imu(), t_ns);
   const bool restarts = lost || without_state_ == Status::lost;
   if (!restarts) without_state_ = recent.count < 2 ? Status::waiting_for_imu : Status::waiting_for_standstill;
   const Start::Situation now{frame, t_ns, sources_.standstill().stands(), sources_.on_ground(), restarts, given};

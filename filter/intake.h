@@ -50,8 +50,8 @@ void take_encoder(const Intake& to, const EncoderSample& sample, const GoTo& go_
   const Ingest::Encoders taken = to.ingest.take(sample, to.ekf.time());
   if (!to.ingest.imu().empty()) to.health.add_encoder(taken.sample, taken.verdict, to.ingest.imu().newest().t_ns);
   if (taken.verdict != Verdict::accepted) return;
-  on_contact(to.sources.watch_contact(taken.sample, to.ekf));
   if (!taken.increment) return;
+  on_contact(to.sources.watch_contact(*taken.increment, to.ekf));
   to.sources.standstill().add(*taken.increment);
   if (const auto due_ns = to.ingest.due_before(*taken.increment, to.ekf.running())) go_to(*due_ns);
   to.ingest.push(*taken.increment);
@@ -68,8 +68,9 @@ void take_laser(const Intake& to, const LaserSample& sample, const LaserCalibrat
     to.health.add_laser(sample, verdict, lasers, to.sources.ground().stuck_beams(), newest_ns);
   }
   if (verdict != Verdict::accepted) return;
-  if (const auto due_ns = to.ingest.due_before(sample, to.ekf.running())) go_to(*due_ns);
-  to.ingest.push(sample);
+  const BeamRanges ranges(sample);
+  if (const auto due_ns = to.ingest.due_before(ranges, to.ekf.running())) go_to(*due_ns);
+  to.ingest.push(ranges);
 }
 
 /// A camera's stamp by the common clock, after take_imu().

@@ -7,7 +7,7 @@
 
 #include "filter/ekf/initial_state.h"
 #include "filter/ekf/propagation.h"
-#include "filter/health/advise.h"
+#include "filter/health/consistency.h"
 #include "filter/intake.h"
 #include "filter/report.h"
 

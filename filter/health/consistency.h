@@ -4,6 +4,8 @@
 
 #include "ear/estimate.h"
 #include "ear/filter_config.h"
+#include "ear/health.h"
+#include "filter/advice.h"
 #include "filter/ekf/displacement.h"
 #include "filter/ekf/gate.h"
 
@@ -21,5 +23,8 @@ class ConsistencyCheck {
   AnomalyConfig config_;
   Gate gate_;
 };
+
+/// Weights (15), where they are switched on: of the sensor at fault; and whether the left camera is sound.
+[[nodiscard]] Advice advise(const Consistency& consistency, const Health& health, const AnomalyConfig& config);
 
 }  // namespace ear

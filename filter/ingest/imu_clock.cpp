@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "filter/ingest/clock_jump.h"
 #include "filter/ingest/stamp_guard.h"
+#include "filter/ingest/stream_clock.h"
 
 namespace ear {
 namespace {

@@ -11,11 +11,18 @@ constexpr std::size_t kReadingCapacity = 512;  // chosen: readings that wait for
 constexpr double kStartWindow = 2.0;           // [s] chosen: of readings kept for a start while rolling
 constexpr double kHeldSample = 0.04;           // [s] chosen: so far the newest inertial sample stands for the next one
 
-/// Makes room in a full queue, and forgets what is too old for a start.
-template <typename T, typename TimeOf>
-void drop_old(Ring<T>& readings, TimeNs newest_ns, const TimeOf& time_of) {
-  const auto too_old = [&] { return seconds_between(time_of(readings.front()), newest_ns) > kStartWindow; };
+TimeNs begin_of(const WheelIncrement& increment) { return increment.from_ns; }
+TimeNs begin_of(const BeamRanges& ranges) { return ranges.t_ns; }
+TimeNs end_of(const WheelIncrement& increment) { return increment.to_ns; }
+TimeNs end_of(const BeamRanges& ranges) { return ranges.t_ns; }
+
+/// Ingest::due_before. Without a state what is too old for a start is forgotten.
+template <typename T>
+std::optional<TimeNs> make_room(Ring<T>& readings, const T& next, bool has_state) {
+  if (has_state) return readings.full() ? std::optional(end_of(readings.front())) : std::nullopt;
+  const auto too_old = [&] { return seconds_between(begin_of(readings.front()), end_of(next)) > kStartWindow; };
   while (!readings.empty() && (readings.full() || too_old())) readings.pop();
+  return std::nullopt;
 }
 
 }  // namespace
@@ -80,15 +87,11 @@ std::optional<TimeNs> Ingest::imu_due() const {
 }
 
 std::optional<TimeNs> Ingest::due_before(const WheelIncrement& increment, bool has_state) {
-  if (has_state) return increments_.full() ? std::optional(increments_.front().to_ns) : std::nullopt;
-  drop_old(increments_, increment.to_ns, [](const WheelIncrement& old) { return old.from_ns; });
-  return std::nullopt;
+  return make_room(increments_, increment, has_state);
 }
 
-std::optional<TimeNs> Ingest::due_before(const LaserSample& sample, bool has_state) {
-  if (has_state) return ranges_.full() ? std::optional(ranges_.front().t_ns) : std::nullopt;
-  drop_old(ranges_, sample.t_ns, [](const BeamRanges& old) { return old.t_ns; });
-  return std::nullopt;
+std::optional<TimeNs> Ingest::due_before(const BeamRanges& ranges, bool has_state) {
+  return make_room(ranges_, ranges, has_state);
 }
 
 std::optional<Measurement> Ingest::next(TimeNs t_ns) {

@@ -59,9 +59,9 @@ class Ingest {
   /// Readings wait here until the state passes them. If the queue is full: the time up to which the state has to go
   /// first. Without a state, the oldest make room.
   [[nodiscard]] std::optional<TimeNs> due_before(const WheelIncrement& increment, bool has_state);
-  [[nodiscard]] std::optional<TimeNs> due_before(const LaserSample& sample, bool has_state);
+  [[nodiscard]] std::optional<TimeNs> due_before(const BeamRanges& ranges, bool has_state);
   void push(const WheelIncrement& increment) { increments_.push(increment); }
-  void push(const LaserSample& sample) { ranges_.push(BeamRanges(sample)); }
+  void push(const BeamRanges& ranges) { ranges_.push(ranges); }
   /// The next one that is not later than `t_ns`, in time order.
   [[nodiscard]] std::optional<Measurement> next(TimeNs t_ns);
   /// All that are earlier.

@@ -19,6 +19,7 @@ class Ring {
   [[nodiscard]] const T& back() const { return (*this)[size_ - 1]; }
   /// Oldest first.
   [[nodiscard]] const T& operator[](std::size_t i) const { return items_[(first_ + i) % items_.size()]; }
+  [[nodiscard]] T& operator[](std::size_t i) { return items_[(first_ + i) % items_.size()]; }
 
   /// Appends; it must not be full.
   void push(const T& item) {

@@ -7,9 +7,7 @@
 
 namespace ear {
 
-/// Stamps farther from zero than this [ns], 142 years, are no times: their differences could overflow.
-inline constexpr TimeNs kLargestTime = 4'500'000'000'000'000'000;
-[[nodiscard]] constexpr bool is_time(TimeNs t_ns) { return t_ns > -kLargestTime && t_ns < kLargestTime; }
+[[nodiscard]] constexpr bool is_time(TimeNs t_ns) { return t_ns > -kLargestStamp && t_ns < kLargestStamp; }
 
 enum class Stamp : std::uint8_t {
   next,       ///< follows the one before

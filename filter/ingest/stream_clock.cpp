@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "filter/ingest/clock_jump.h"
 #include "filter/ingest/stamp_guard.h"
 
 namespace ear {

@@ -3,11 +3,20 @@
 // in both: neither is a jump. docs/ingest.md.
 #pragma once
 
+#include <cmath>
 #include <optional>
 
 #include "ear/types.h"
 
 namespace ear {
+
+inline constexpr double kClockJump = 0.04;        ///< [s] either way; less may be a driver that was held up
+inline constexpr double kLargestClockJump = 5.0;  ///< [s] beyond that it is another clock
+
+/// Of any sensor. `off`: by how much a stamp is off the place where it should be [s].
+[[nodiscard]] inline bool is_clock_jump(double off) {
+  return std::abs(off) > kClockJump && std::abs(off) < kLargestClockJump;
+}
 
 class StreamClock {
  public:

@@ -45,7 +45,7 @@ TEST_CASE("ingest: readings come out in the order of their times, increments at 
   push(ingest, 0, 0);
   push(ingest, 10 * kMs, 100);
   push(ingest, 20 * kMs, 200);
-  for (const TimeNs t_ns : {2 * kMs, 12 * kMs}) ingest.push(LaserSample{t_ns, {0.1, 0.2, 0.3}});
+  for (const TimeNs t_ns : {2 * kMs, 12 * kMs}) ingest.push(BeamRanges(LaserSample{t_ns, {0.1, 0.2, 0.3}}));
   std::vector<TimeNs> times;
   while (const auto next = ingest.next(18 * kMs)) {
     times.push_back(next->t_ns);

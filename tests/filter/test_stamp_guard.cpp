@@ -31,7 +31,7 @@ TEST_CASE("stamp guard: stamps in order are believed, duplicates and earlier one
 }
 
 TEST_CASE("stamp guard: one false stamp shuts out nothing that follows") {
-  for (const TimeNs false_ns : {3600 * kSecond, kLargestTime - 1, -kLargestTime + 1, -3600 * kSecond}) {
+  for (const TimeNs false_ns : {3600 * kSecond, kLargestStamp - 1, -kLargestStamp + 1, -3600 * kSecond}) {
     CAPTURE(false_ns);
     StampGuard guard;
     CHECK(believed(guard, 0, 100) == 100);
@@ -50,7 +50,7 @@ TEST_CASE("stamp guard: a stream that returns is believed at its third sample") 
 }
 
 TEST_CASE("stamp guard: a clock that was set back is believed after a second, a first stamp that was false too") {
-  for (const TimeNs first_ns : {100 * kSecond, kLargestTime - 1}) {
+  for (const TimeNs first_ns : {100 * kSecond, kLargestStamp - 1}) {
     StampGuard guard;
     CHECK(guard.judge(first_ns) == Stamp::next);
     for (int i = 0; i < 200; ++i) CHECK(guard.judge(i * kPeriod) == Stamp::not_later);

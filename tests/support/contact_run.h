@@ -73,6 +73,7 @@ struct ContactTruth {
   };
   std::vector<Event> events;
   ContactDetector detector(ContactConfig{}, simulation.calibration());
+  EncoderReader reader(*simulation.calibration().encoder);
   std::size_t imu = 0, encoder = 0, laser = 0;
   const auto next = [](const auto& samples, std::size_t i) { return i < samples.size() ? samples[i].t_ns : kEnd; };
   while (imu < simulation.imu().size()) {
@@ -84,7 +85,7 @@ struct ContactTruth {
     if (laser_ns == t_ns) {
       event = detector.add_laser(simulation.lasers()[laser++]);
     } else if (encoder_ns == t_ns) {
-      event = detector.add_encoder(simulation.encoders()[encoder++]);
+      if (const auto increment = reader.add(simulation.encoders()[encoder++])) event = detector.add_wheels(*increment);
     } else {
       event = detector.add_imu(simulation.imu()[imu++]);
     }

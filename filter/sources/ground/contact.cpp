@@ -20,7 +20,6 @@ constexpr double kAirSpeed = 1.0;       // [m/s] at which the ground passes belo
 constexpr double kFirstDuration = 0.1;  // [s] of evidence for the first mode
 constexpr double kSilence = 0.3;        // [s] without a reading that agrees, and the beams show nothing
 constexpr double kHeightKnown = 0.05;   // [m]
-constexpr double kNormalKnown = 0.087;  // [rad]
 
 }  // namespace
 
@@ -37,16 +36,6 @@ ContactDetector::ContactDetector(const ContactConfig& config, const Calibration&
 
 std::optional<TimeNs> ContactDetector::since_ns() const {
   return since_ns_ == kNever ? std::nullopt : std::optional(since_ns_);
-}
-
-std::optional<double> ContactDetector::height() const {
-  if (!ground_ || ground_->height_sigma() > kHeightKnown) return std::nullopt;
-  return ground_->height();
-}
-
-std::optional<Eigen::Vector3d> ContactDetector::n_B() const {
-  if (!ground_ || ground_->normal_sigma() > kNormalKnown) return std::nullopt;
-  return ground_->n_B();
 }
 
 ContactEvent ContactDetector::add_imu(const ImuSample& sample) {
@@ -74,13 +63,12 @@ ContactEvent ContactDetector::add_imu(const ImuSample& sample) {
   return look_for_confirmed_touchdown(sample.t_ns);
 }
 
-ContactEvent ContactDetector::add_encoder(const EncoderSample& sample) {
+ContactEvent ContactDetector::add_wheels(const WheelIncrement& increment) {
   if (!ground_) return ContactEvent::none;
-  const std::optional<WheelWatch::Motion> motion = wheels_->add(sample);
-  if (!motion) return ContactEvent::none;
-  if (motion->driven) driven_ns_ = sample.t_ns;
-  roll(*motion);
-  return look_for_confirmed_touchdown(sample.t_ns);
+  const WheelWatch::Motion motion = wheels_->add(increment);
+  if (motion.driven) driven_ns_ = increment.to_ns;
+  roll(motion);
+  return look_for_confirmed_touchdown(increment.to_ns);
 }
 
 ContactEvent ContactDetector::add_laser(const LaserSample& sample) {

@@ -32,7 +32,7 @@ class ContactDetector {
 
   /// Each returns whether the mode has just changed. The first mode after `unknown` is no event.
   ContactEvent add_imu(const ImuSample& sample);
-  ContactEvent add_encoder(const EncoderSample& sample);
+  ContactEvent add_wheels(const WheelIncrement& increment);
   ContactEvent add_laser(const LaserSample& sample);
 
   /// What to take off the gyroscope's rates [rad/s]; zero is good enough while all beams see the ground.
@@ -45,10 +45,6 @@ class ContactDetector {
   [[nodiscard]] std::bitset<kMaxBeams> stuck_beams() const {
     return ground_ ? ground_->stuck_beams() : std::bitset<kMaxBeams>{};
   }
-  /// Height of the wheels above the ground's plane [m], if the beams show it to 5 cm.
-  [[nodiscard]] std::optional<double> height() const;
-  /// Unit normal of the ground in the body frame, if the beams show it to 5 degrees.
-  [[nodiscard]] std::optional<Eigen::Vector3d> n_B() const;
 
  private:
   static constexpr TimeNs kNever = std::numeric_limits<TimeNs>::min() / 2;

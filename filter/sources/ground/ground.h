@@ -24,7 +24,7 @@ class Ground {
   /// For contact: every sample, in time order. Afterwards nothing is known of the ground if the wheels left it or met
   /// it.
   ContactEvent add(const ImuSample& sample) { return note(contact_.add_imu(sample)); }
-  ContactEvent add(const EncoderSample& sample) { return note(contact_.add_encoder(sample)); }
+  ContactEvent add(const WheelIncrement& increment) { return note(contact_.add_wheels(increment)); }
   ContactEvent add(const LaserSample& sample) { return note(contact_.add_laser(sample)); }
   void set_gyro_bias(const Eigen::Vector3d& b_g) { contact_.set_gyro_bias(b_g); }
 

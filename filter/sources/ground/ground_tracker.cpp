@@ -41,8 +41,6 @@ GroundTracker::GroundTracker(const LaserCalibration& lasers, const EncoderCalibr
 
 double GroundTracker::height_sigma() const { return std::sqrt(P_(kHeight, kHeight)); }
 
-double GroundTracker::normal_sigma() const { return std::sqrt(std::max(0.0, P_.topLeftCorner<3, 3>().trace())); }
-
 void GroundTracker::turn(const Eigen::Vector3d& angle_B, const Eigen::Vector3d& accel_B, double dt) {
   const Eigen::Matrix3d R = exp_so3(-angle_B);
   x_.head<3>() = R * x_.head<3>();

@@ -47,7 +47,6 @@ class GroundTracker {
   [[nodiscard]] double height_sigma() const;                   ///< [m]
   [[nodiscard]] double climb() const { return x_(kClimb); }    ///< [m/s]
   [[nodiscard]] Eigen::Vector3d n_B() const { return x_.head<3>(); }
-  [[nodiscard]] double normal_sigma() const;  ///< of the direction known worst [rad]
 
  private:
   static constexpr int kHeight = 3, kClimb = 4, kSize = 5;

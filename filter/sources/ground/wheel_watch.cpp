@@ -12,22 +12,18 @@ constexpr double kNoise = 7.0;   // and so many standard deviations of a reading
 
 }  // namespace
 
-std::optional<WheelWatch::Motion> WheelWatch::add(const EncoderSample& sample) {
-  if (reader_.any() && sample.t_ns <= reader_.last_ns()) return std::nullopt;
+WheelWatch::Motion WheelWatch::add(const WheelIncrement& turn) {
   const double body_angle = body_angle_;
   body_angle_ = 0.0;
-  const std::optional<WheelIncrement> turn = reader_.add(sample);
-  if (!turn) return std::nullopt;
-
   Motion motion;
-  motion.dt = turn->duration();
+  motion.dt = turn.duration();
   const double noise = 2.0 * M_PI * axle_.noise_counts / static_cast<double>(axle_.resolution) / motion.dt;
   const double faster = kFaster + kNoise * noise;
   const double share = 1.0 - std::exp(-motion.dt / kMoment);
   for (int i = 0; i < 2; ++i) {
-    const double angle = turn->angle(i) + body_angle;  // against the world
+    const double angle = turn.angle(i) + body_angle;  // against the world
     Wheel& wheel = wheels_[static_cast<std::size_t>(i)];
-    const Wheel now{turn->angle(i) / motion.dt, angle / motion.dt};
+    const Wheel now{turn.angle(i) / motion.dt, angle / motion.dt};
     motion.distance = std::max(motion.distance, std::abs(axle_.wheel_radius[static_cast<std::size_t>(i)] * angle));
     motion.driven = motion.driven || (motion.dt < kMoment && std::abs(now.rate) > std::abs(wheel.rate) + faster &&
                                       std::abs(now.spin) > std::abs(wheel.spin) + faster);

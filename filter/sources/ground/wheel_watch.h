@@ -2,30 +2,28 @@
 #pragma once
 
 #include <array>
-#include <optional>
 
 #include "ear/calibration.h"
-#include "ear/types.h"
 #include "filter/ingest/wheel_increment.h"
 
 namespace ear {
 
 class WheelWatch {
  public:
-  explicit WheelWatch(const EncoderCalibration& axle) : axle_(axle), reader_(axle) {}
+  explicit WheelWatch(const EncoderCalibration& axle) : axle_(axle) {}
 
   /// The body turned about the axle by `angle` [rad], nose-down positive. The encoders count that too.
   void turn_body(double angle) { body_angle_ += angle; }
 
   struct Motion {
-    double dt = 0.0;        ///< since the sample before [s]
+    double dt = 0.0;        ///< [s]
     double distance = 0.0;  ///< that the faster wheel rolled in it, backwards too [m]
     /// A wheel turns faster than a moment ago, against the body and against the world. A free wheel never does: its
     /// bearing takes it along with the body, its inertia holds it.
     bool driven = false;
   };
-  /// Samples in time order. Nothing for the first, and for one that is not later than the one before.
-  std::optional<Motion> add(const EncoderSample& sample);
+  /// Increments in time order.
+  Motion add(const WheelIncrement& turn);
 
  private:
   struct Wheel {
@@ -34,8 +32,7 @@ class WheelWatch {
   };
 
   EncoderCalibration axle_;
-  EncoderReader reader_;
-  double body_angle_ = 0.0;  ///< since the last sample
+  double body_angle_ = 0.0;  ///< since the last increment
   std::array<Wheel, 2> wheels_;
 };
 
