@@ -26,13 +26,11 @@ double ExcessWatch::add(const Eigen::Vector3d& value, double dt) {
   const Eigen::Vector3d deviation = value - mean_;
   const double distance = deviation.norm();
   const double ordinary = std::max(least_, kSpread * std::sqrt(variance_));
-  const bool limit_known = range_ > 0.0 || clip_level_ > 0.0;
   const bool cut_off = clips_ = clipped(value);
   last_ = value;
 
   const bool strikes = distance > ordinary;
   lasts_ = strikes || cut_off ? lasts_ + 1 : 0;
-  clipped_before_ = cut_off && !limit_known ? lasts_ - 1 : 0;
   lasting_ = lasts_ > 1 ? lasting_ + dt : 0.0;
   const bool strike = strikes && lasting_ < kLongest;
 

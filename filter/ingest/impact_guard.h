@@ -3,7 +3,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <algorithm>
 #include <optional>
 
 #include "ear/calibration.h"
@@ -25,8 +24,6 @@ class ExcessWatch {
   double add(const Eigen::Vector3d& value, double dt);
   /// Was the last value clipped?
   [[nodiscard]] bool clips() const { return clips_; }
-  /// How many values before the last one turn out, by it, to have been clipped as well.
-  [[nodiscard]] int clipped_before() const { return clipped_before_; }
 
  private:
   [[nodiscard]] bool clipped(const Eigen::Vector3d& value);
@@ -39,7 +36,6 @@ class ExcessWatch {
   double variance_ = 0.0;  ///< of the distance from the mean
   int lasts_ = 0;          ///< samples in a row out of the ordinary
   double lasting_ = 0.0;   ///< from the first of them to now [s]
-  int clipped_before_ = 0;
   bool clips_ = false;
 };
 
@@ -52,8 +48,6 @@ class ImpactGuard {
   ImuNoiseFactors add(const ImuSample& sample);
   [[nodiscard]] bool gyro_clips() const { return gyro_.clips(); }  ///< the last sample
   [[nodiscard]] bool accel_clips() const { return accel_.clips(); }
-  /// So many samples before the last one have its factors as well: that there is a limit was not known yet.
-  [[nodiscard]] int clipped_before() const { return std::max(gyro_.clipped_before(), accel_.clipped_before()); }
 
  private:
   ExcessWatch gyro_, accel_;

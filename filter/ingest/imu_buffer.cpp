@@ -5,18 +5,13 @@
 namespace ear {
 
 void ImuBuffer::push(const ImuSample& sample, const ImuNoiseFactors& noise) {
-  samples_[slot(size_)] = sample;
-  noise_[slot(size_)] = noise;
-  if (size_ < samples_.size()) {
-    ++size_;
-  } else {
-    first_ = (first_ + 1) % samples_.size();
-  }
+  if (entries_.full()) entries_.pop();
+  entries_.push({sample, noise});
 }
 
 std::size_t ImuBuffer::first_after(TimeNs t_ns) const {
   std::size_t low = 0;
-  std::size_t high = size_;
+  std::size_t high = size();
   while (low < high) {
     const std::size_t middle = (low + high) / 2;
     if ((*this)[middle].t_ns > t_ns) {
@@ -32,7 +27,7 @@ ImuSample ImuBuffer::interpolate(std::size_t next, TimeNs t_ns) const {
   ImuSample result;
   if (next == 0) {
     result = (*this)[0];
-  } else if (next >= size_) {
+  } else if (next >= size()) {
     result = newest();
   } else {
     const ImuSample& a = (*this)[next - 1];
@@ -45,16 +40,9 @@ ImuSample ImuBuffer::interpolate(std::size_t next, TimeNs t_ns) const {
   return result;
 }
 
-void ImuBuffer::raise_newest_noise(std::size_t count, const ImuNoiseFactors& noise) {
-  for (std::size_t i = size_ - std::min(count, size_); i < size_; ++i) {
-    ImuNoiseFactors& factors = noise_[slot(i)];
-    factors = {std::max(factors.gyro, noise.gyro), std::max(factors.accel, noise.accel)};
-  }
-}
-
 ImuNoiseFactors ImuBuffer::noise_around(std::size_t next) const {
-  const ImuNoiseFactors& a = noise_[slot(next == 0 ? 0 : std::min(next, size_) - 1)];
-  const ImuNoiseFactors& b = noise_[slot(std::min(next, size_ - 1))];
+  const ImuNoiseFactors& a = entries_[next == 0 ? 0 : std::min(next, size()) - 1].noise;
+  const ImuNoiseFactors& b = entries_[std::min(next, size() - 1)].noise;
   return {std::max(a.gyro, b.gyro), std::max(a.accel, b.accel)};
 }
 

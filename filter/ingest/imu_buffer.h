@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <cstddef>
 #include <type_traits>
-#include <vector>
 
 #include "ear/types.h"
+#include "filter/ingest/ring.h"
 
 namespace ear {
 
@@ -33,29 +33,26 @@ struct MeanRate {
   double noise_factor = 1.0;                         ///< the largest of the samples'
 };
 
-/// Ring of fixed capacity; the oldest sample makes room.
+/// Of fixed capacity; the oldest sample makes room.
 class ImuBuffer {
  public:
-  explicit ImuBuffer(std::size_t capacity) : samples_(capacity), noise_(capacity) {}
+  struct Entry {
+    ImuSample sample;
+    ImuNoiseFactors noise;
+  };
+
+  explicit ImuBuffer(std::size_t capacity) : entries_(capacity) {}
 
   void push(const ImuSample& sample, const ImuNoiseFactors& noise = {});
-  void clear() { size_ = 0; }
+  void clear() { entries_.clear(); }
   /// The sample that so many came after, to correct it: its stamp stays.
-  struct Entry {
-    ImuSample& sample;
-    ImuNoiseFactors& noise;
-  };
-  [[nodiscard]] Entry entry(std::size_t age) {
-    return {samples_[slot(size_ - 1 - age)], noise_[slot(size_ - 1 - age)]};
-  }
-  /// The `count` newest samples have at least this noise.
-  void raise_newest_noise(std::size_t count, const ImuNoiseFactors& noise);
+  [[nodiscard]] Entry& entry(std::size_t age) { return entries_[size() - 1 - age]; }
 
-  [[nodiscard]] bool empty() const { return size_ == 0; }
-  [[nodiscard]] std::size_t size() const { return size_; }
+  [[nodiscard]] bool empty() const { return entries_.empty(); }
+  [[nodiscard]] std::size_t size() const { return entries_.size(); }
   /// Oldest first.
-  [[nodiscard]] const ImuSample& operator[](std::size_t i) const { return samples_[slot(i)]; }
-  [[nodiscard]] const ImuSample& newest() const { return (*this)[size_ - 1]; }
+  [[nodiscard]] const ImuSample& operator[](std::size_t i) const { return entries_[i].sample; }
+  [[nodiscard]] const ImuSample& newest() const { return entries_.back().sample; }
 
   /// Samples with from_ns <= t <= to_ns.
   [[nodiscard]] ImuStatistics statistics(TimeNs from_ns, TimeNs to_ns) const;
@@ -72,7 +69,7 @@ class ImuBuffer {
     std::size_t next = first_after(from_ns);
     ImuSample start = interpolate(next, from_ns);
     while (start.t_ns < to_ns) {
-      const ImuSample end = next < size_ && (*this)[next].t_ns <= to_ns ? (*this)[next] : interpolate(next, to_ns);
+      const ImuSample end = next < size() && (*this)[next].t_ns <= to_ns ? (*this)[next] : interpolate(next, to_ns);
       const Eigen::Vector3d gyro_B = 0.5 * (start.gyro_B + end.gyro_B);
       const Eigen::Vector3d accel_B = 0.5 * (start.accel_B + end.accel_B);
       const double dt = seconds_between(start.t_ns, end.t_ns);
@@ -94,12 +91,8 @@ class ImuBuffer {
 
   /// Of the samples before and at `next`, the larger.
   [[nodiscard]] ImuNoiseFactors noise_around(std::size_t next) const;
-  [[nodiscard]] std::size_t slot(std::size_t i) const { return (first_ + i) % samples_.size(); }
 
-  std::vector<ImuSample> samples_;
-  std::vector<ImuNoiseFactors> noise_;  // of each
-  std::size_t first_ = 0;
-  std::size_t size_ = 0;
+  Ring<Entry> entries_;
 };
 
 }  // namespace ear

@@ -37,7 +37,7 @@ bool SpikeWatch::add(ImuBuffer& samples, double dt, bool no_strike, bool clips) 
   if (length_ == 0 && !begins) return false;
   measured_[length_++] = value;
   for (std::size_t i = may_be_strike && length_ == 1 ? 1 : 0; i < length_; ++i) {
-    const ImuBuffer::Entry held = samples.entry(length_ - 1 - i);
+    ImuBuffer::Entry& held = samples.entry(length_ - 1 - i);
     const double coherent = std::sqrt(2.0 * static_cast<double>(i) + 1.0);
     held.sample.*value_ = before;
     held.noise.*factor_ = std::max(held.noise.*factor_, coherent * (measured_[i] - before).norm() / sigma_);

@@ -59,9 +59,7 @@ ImuVerdict Ingest::judge(const ImuSample& sample) {
 
 ImuFault Ingest::store(const ImuSample& sample) {
   const double dt = imu_.empty() ? INFINITY : seconds_between(imu_.newest().t_ns, sample.t_ns);
-  const ImuNoiseFactors noise = impact_guard_.add(sample);
-  imu_.raise_newest_noise(static_cast<std::size_t>(impact_guard_.clipped_before()), noise);
-  imu_.push(sample, noise);
+  imu_.push(sample, impact_guard_.add(sample));
   ImuFault spike;
   if (dt <= config_.max_imu_gap) {
     spike = spikes_.add(imu_, dt, impact_guard_.accel_clips());

@@ -33,7 +33,6 @@ class Stream {
     return {t_ns_, random(0.014), random(spread) + Eigen::Vector3d(0.0, 0.0, kGravity) + force_B};
   }
   ImuNoiseFactors add(const ImuSample& s) { return guard_.add(s); }
-  [[nodiscard]] int clipped_before() const { return guard_.clipped_before(); }
   ImuNoiseFactors add(double upwards, double vibration = 0.0) { return add(sample({0.0, 0.0, upwards}, vibration)); }
 
  private:
@@ -127,20 +126,6 @@ TEST_CASE("impact: a flat top is clipped; once seen, its level is known") {
   CHECK(strike()[0] > 0.8 * whole);
   // A larger value: that level was no limit.
   CHECK(stream.add(50.0).accel < 0.5 * (50.0 / kAccelSigma));
-}
-
-TEST_CASE("impact: the sample that tells of the limit tells it of those before it") {
-  Stream stream;
-  for (int i = 0; i < 400; ++i) stream.add(0.0);
-  for (const double rate : {8.7, -8.7, -8.7}) {
-    CHECK(stream.clipped_before() == 0);
-    ImuSample s = stream.sample(Eigen::Vector3d::Zero());
-    s.gyro_B.x() = rate;
-    stream.add(s);
-  }
-  CHECK(stream.clipped_before() == 2);
-  stream.add(0.0);
-  CHECK(stream.clipped_before() == 0);
 }
 
 TEST_CASE("impact: with a known range the first clipped sample counts in full") {

@@ -66,7 +66,7 @@ TEST_CASE("imu buffer: statistics of an interval") {
 
 TEST_CASE("imu buffer: a piece has the larger noise of the samples at its ends; the mean rate has the largest") {
   ImuBuffer buffer = ramp(100, 11);
-  buffer.raise_newest_noise(2, {5.0, 7.0});  // at 0.09 and 0.1 s
+  for (const std::size_t age : {0, 1}) buffer.entry(age).noise = {5.0, 7.0};  // at 0.1 and 0.09 s
   const auto factor = [&](TimeNs from, TimeNs to) {
     double largest = 0.0;
     buffer.for_each_piece(from, to,
