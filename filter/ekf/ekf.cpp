@@ -8,9 +8,8 @@
 namespace ear {
 namespace {
 
-constexpr double kGapNoiseFactor = 10.0;  // chosen: on the noise densities while a gap in the IMU data is bridged
-constexpr double kKnownScale = 1e-6;      // of the wheels where nothing can measure it: zero, but regular
-constexpr double kUncertainTurn = 5e-3;   // [rad] chosen: standard deviation of one sample that images must confirm
+constexpr double kKnownScale = 1e-6;     // of the wheels where nothing can measure it: zero, but regular
+constexpr double kUncertainTurn = 5e-3;  // [rad] chosen: standard deviation of one sample that images must confirm
 
 int error_capacity(const FilterConfig& config) { return err::clone(config.window + 1); }
 
@@ -54,7 +53,7 @@ void Ekf::reset() {
   bias_changes_ = BiasChanges{};
 }
 
-std::optional<TimeNs> Ekf::propagate(const ImuBuffer& samples, TimeNs t_ns, const Propagation& how) {
+std::optional<TimeNs> Ekf::propagate(const ImuBuffer& samples, TimeNs t_ns, double weight, double normal_walk) {
   std::optional<TimeNs> uncertain_ns;
   if (t_ns <= state_.imu.t_ns) return uncertain_ns;
   std::optional<ErrorTransition> total;
@@ -62,14 +61,8 @@ std::optional<TimeNs> Ekf::propagate(const ImuBuffer& samples, TimeNs t_ns, cons
   samples.for_each_piece(
       state_.imu.t_ns, t_ns,
       [&](const Eigen::Vector3d& gyro_B, const Eigen::Vector3d& accel_B, double dt, const ImuNoiseFactors& factors) {
-        ImuCalibration noise = calibration_.imu;
-        noise.gyro_noise *= factors.gyro;
-        noise.accel_noise *= factors.accel / how.weight;
+        const ImuCalibration noise = with_factors(calibration_.imu, {factors.gyro, factors.accel / weight});
         if (noise.gyro_noise * std::sqrt(dt) > kUncertainTurn && !uncertain_ns) uncertain_ns = state_.imu.t_ns;
-        if (how.gap_from_ns && state_.imu.t_ns >= *how.gap_from_ns) {
-          noise.gyro_noise *= kGapNoiseFactor;
-          noise.accel_noise *= kGapNoiseFactor;
-        }
         const ErrorTransition step = error_transition(state_.imu, gyro_B, accel_B, dt, noise);
         if (total) {
           chain(*total, step);
@@ -82,7 +75,7 @@ std::optional<TimeNs> Ekf::propagate(const ImuBuffer& samples, TimeNs t_ns, cons
   state_.imu.t_ns = t_ns;
   const double distance = state_.imu.v_W.norm() * duration;
   covariance_.propagate(total.value_or(ErrorTransition{}), tangent_basis(state_.ground.n_W),
-                        how.normal_walk * how.normal_walk * distance);
+                        normal_walk * normal_walk * distance);
   return uncertain_ns;
 }
 

@@ -48,14 +48,10 @@ class Ekf {
   [[nodiscard]] bool running() const { return running_; }
   [[nodiscard]] std::optional<TimeNs> time() const { return running_ ? std::optional(state_.imu.t_ns) : std::nullopt; }
 
-  /// How the samples up to there are to be taken.
-  struct Propagation {
-    double weight = 1.0;                ///< (15): the noise of the accelerometer is divided by it
-    std::optional<TimeNs> gap_from_ns;  ///< from there on samples are missing
-    double normal_walk = 0.0;           ///< how the ground's normal turns [rad/sqrt(m)]
-  };
   /// To `t_ns`, by the samples. The time of the first one, if any, that may be off by more than noise (clipped).
-  std::optional<TimeNs> propagate(const ImuBuffer& samples, TimeNs t_ns, const Propagation& how);
+  /// `weight` (15): the noise of the accelerometer is divided by it. `normal_walk`: how the ground's normal turns
+  /// [rad/sqrt(m)].
+  std::optional<TimeNs> propagate(const ImuBuffer& samples, TimeNs t_ns, double weight, double normal_walk);
 
   /// The gate: one row of ground columns against what the state and its own noise allow.
   template <typename Row>

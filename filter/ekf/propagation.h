@@ -60,6 +60,13 @@ void carry_columns(const ImuErrorMatrix& Phi, Eigen::MatrixBase<Matrix>& M) {
   add(err::theta, err::b_g);
 }
 
+/// The noise of samples that are less certain than usual.
+[[nodiscard]] inline ImuCalibration with_factors(ImuCalibration imu, const ImuNoiseFactors& factors) {
+  imu.gyro_noise *= factors.gyro;
+  imu.accel_noise *= factors.accel;
+  return imu;
+}
+
 /// `total` followed by `step`.
 void chain(ErrorTransition& total, const ErrorTransition& step);
 

@@ -16,8 +16,6 @@ void ImuInterruption::add_uncertain(TimeNs t_ns) {
   if (!uncertain_since_ns_) uncertain_since_ns_ = t_ns;
 }
 
-std::optional<TimeNs> ImuInterruption::gap_from() const { return gap_ ? std::optional(gap_->from_ns) : std::nullopt; }
-
 /// What the vehicle did in the gap, it did all the time: standard deviations grow with the time.
 double ImuInterruption::take_unseen(TimeNs t_ns) {
   if (!gap_ || t_ns <= gap_->from_ns) return 0.0;

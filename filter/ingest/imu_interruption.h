@@ -17,8 +17,6 @@ class ImuInterruption {
   /// Two images have shown the motion, up to that time.
   void set_bridged(TimeNs t_ns) { bridged_ns_ = t_ns; }
 
-  /// Where the samples are missing, from there on.
-  [[nodiscard]] std::optional<TimeNs> gap_from() const;
   /// The vehicle moved unseen for so long [s], as far as the state, which has come to `t_ns`, does not know of it yet.
   [[nodiscard]] double take_unseen(TimeNs t_ns);
   /// Is there anything to bridge? Asked once a frame, which then is past.

@@ -77,7 +77,7 @@ void Sources::propagate(TimeNs t_ns, const Advice& advice, Ingest& ingest, Ekf& 
   if (t_ns <= ekf.state().imu.t_ns) return;
   ImuInterruption& interruption = ingest.interruption();
   const std::optional<TimeNs> uncertain_ns =
-      ekf.propagate(ingest.imu(), t_ns, {advice.of(MotionSensor::imu), interruption.gap_from(), normal_walk_});
+      ekf.propagate(ingest.imu(), t_ns, advice.of(MotionSensor::imu), normal_walk_);
   if (uncertain_ns) interruption.add_uncertain(*uncertain_ns);
   const double unseen = interruption.take_unseen(t_ns);
   if (unseen > 0.0) {
