@@ -48,7 +48,7 @@ void take_imu(const Intake& to, double max_gap, const Restart& restart, const Go
 template <typename GoTo, typename OnContact>
 void take_encoder(const Intake& to, const EncoderSample& sample, const GoTo& go_to, const OnContact& on_contact) {
   const Ingest::Encoders taken = to.ingest.take(sample, to.ekf.time());
-  if (!to.ingest.imu().empty()) to.health.add_encoder(taken.sample, taken.verdict, to.ingest.imu().newest().t_ns);
+  if (!to.ingest.imu().empty()) to.health.add_encoder(taken.verdict, to.ingest.imu().newest().t_ns);
   if (taken.verdict != Verdict::accepted) return;
   if (!taken.increment) return;
   on_contact(to.sources.watch_contact(*taken.increment, to.ekf));

@@ -84,8 +84,10 @@ std::string to_text(HealthStatus status) {
 std::string to_text(const Health& health) {
   std::string text = to_text(health.status);
   if (health.load_step > 0) text += ", load step " + std::to_string(health.load_step);
-  if (health.reason != Reason::none) return text + ": " + to_text(health.reason);
-  if (health.status != HealthStatus::degraded) return text;
+  if (health.status == HealthStatus::tracking) return text;
+  if (health.status != HealthStatus::degraded) {
+    return health.reason == Reason::none ? text : text + ": " + to_text(health.reason);
+  }
   const char* separator = ": without ";
   for (std::size_t source = 0; source < kSourceCount; ++source) {
     if (!health.faulty[source]) continue;

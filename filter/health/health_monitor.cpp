@@ -79,22 +79,21 @@ void HealthMonitor::report_camera_fault(TimeNs t_ns) {
   decide(t_ns);
 }
 
-void HealthMonitor::add_encoder(const EncoderSample& sample, Verdict verdict, TimeNs imu_ns) {
+void HealthMonitor::add_encoder(Verdict verdict, TimeNs imu_ns) {
   arrivals_.encoder_interval = std::min(seconds_between(arrivals_.encoder_ns, imu_ns), kStale);
   arrivals_.encoder_ns = imu_ns;
-  if (verdict == Verdict::impossible || encoder_stamps_.add(sample.t_ns, imu_ns))
-    report({Source::wheel_left, Source::wheel_right}, imu_ns);
+  if (verdict == Verdict::impossible) report({Source::wheel_left, Source::wheel_right}, imu_ns);
 }
 
 void HealthMonitor::add_laser(const LaserSample& sample, Verdict verdict, const LaserCalibration& lasers,
                               const std::bitset<kMaxBeams>& stuck, TimeNs imu_ns) {
   arrivals_.laser_ns = imu_ns;
-  const bool unusual = verdict == Verdict::impossible || laser_stamps_.add(sample.t_ns, imu_ns);
   const bool moves = health_.aiding != Aiding::standing;
   for (std::size_t beam = 0; beam < std::min(beams_, sample.range.size()); ++beam) {
     const double range = sample.range[beam];
     no_return_[beam] = !(range >= lasers.range_min && range <= lasers.range_max);
-    if (unusual || (stuck[beam] && moves && !no_return_[beam])) report({beam_source(beam)}, imu_ns);
+    if (verdict == Verdict::impossible || (stuck[beam] && moves && !no_return_[beam]))
+      report({beam_source(beam)}, imu_ns);
   }
 }
 

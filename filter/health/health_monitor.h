@@ -13,7 +13,6 @@
 #include "filter/health/fault_state.h"
 #include "filter/health/image_health.h"
 #include "filter/health/rotation_check.h"
-#include "filter/health/stamp_watch.h"
 #include "filter/ingest/beam_ranges.h"
 #include "filter/ingest/input_guard.h"
 
@@ -35,7 +34,7 @@ class HealthMonitor {
   void report_camera_fault(TimeNs t_ns);
   /// A reading, used or refused, and the stamp of the newest inertial sample. `stuck`: beams that give the same range
   /// again and again.
-  void add_encoder(const EncoderSample& sample, Verdict verdict, TimeNs imu_ns);
+  void add_encoder(Verdict verdict, TimeNs imu_ns);
   void add_laser(const LaserSample& sample, Verdict verdict, const LaserCalibration& lasers,
                  const std::bitset<kMaxBeams>& stuck, TimeNs imu_ns);
 
@@ -109,7 +108,6 @@ class HealthMonitor {
   std::array<FaultState, kSourceCount> faults_;  ///< of all but the cameras
   ImageHealth images_;
   RotationCheck rotation_;
-  StampWatch encoder_stamps_, laser_stamps_;
   std::array<bool, kMaxBeams> no_return_{};
   Arrivals arrivals_;
   Life life_;

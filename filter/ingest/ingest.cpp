@@ -70,14 +70,12 @@ ImuFault Ingest::store(const ImuSample& sample) {
   return {spike.gyro || impact_guard_.gyro_clips(), spike.accel || impact_guard_.accel_clips()};
 }
 
-Ingest::Encoders Ingest::take(const EncoderSample& given, std::optional<TimeNs> state_ns) {
-  Encoders taken;
-  taken.sample = given;
-  const std::optional<TimeNs> stamp = encoder_clock_.correct(given.t_ns, now());
-  if (stamp) taken.sample.t_ns = *stamp;
-  taken.verdict = stamp ? guard_.judge(taken.sample, state_ns, *encoder_) : guard_.refuse_encoder();
-  if (taken.verdict == Verdict::accepted) taken.increment = encoder_->add(taken.sample);
-  return taken;
+Ingest::Encoders Ingest::take(EncoderSample sample, std::optional<TimeNs> state_ns) {
+  const std::optional<TimeNs> stamp = encoder_clock_.correct(sample.t_ns, now());
+  if (!stamp) return {guard_.refuse_encoder(), std::nullopt};
+  sample.t_ns = *stamp;
+  const Verdict verdict = guard_.judge(sample, state_ns, *encoder_);
+  return {verdict, verdict == Verdict::accepted ? encoder_->add(sample) : std::nullopt};
 }
 
 std::optional<TimeNs> Ingest::imu_due() const {

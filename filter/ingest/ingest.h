@@ -39,14 +39,13 @@ class Ingest {
   /// Into the buffer. What only a fault of a sensor does: a spike (of the samples before), a clipped value.
   ImuFault store(const ImuSample& sample);
 
-  /// A reading, by the common clock and with the wheels' increment since the one before.
+  /// What becomes of a reading: the wheels' increment since the one before, by the common clock.
   struct Encoders {
-    EncoderSample sample;
     Verdict verdict = Verdict::mistimed;
     std::optional<WheelIncrement> increment;
   };
   /// `state_ns`: time of the state, if there is one.
-  [[nodiscard]] Encoders take(const EncoderSample& sample, std::optional<TimeNs> state_ns);
+  [[nodiscard]] Encoders take(EncoderSample sample, std::optional<TimeNs> state_ns);
   [[nodiscard]] Verdict judge(const LaserSample& sample, std::optional<TimeNs> state_ns) {
     return guard_.judge(sample, state_ns);
   }
