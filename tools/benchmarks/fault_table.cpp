@@ -179,8 +179,8 @@ struct FaultRow {
     if (lost.empty()) return;
     std::printf("| `%s` | %s | %.4f | %.4f | %.2f / %.2f | %.2f / %.2f | %d | %.1f / %.1f | %d | %.1f | %.1f |\n",
                 fault.c_str(), sequence.c_str(), median(clean), median(ate), median(ratio), largest(ratio),
-                median(said), largest(said), unnoticed, median(content), largest(content), never_content,
-                largest(lost), largest(untrue));
+                median(said), largest(said), unnoticed, median(content), largest(content), never_content, largest(lost),
+                largest(untrue));
   }
 };
 
