@@ -31,12 +31,14 @@ Link::~Link() {
 }
 
 void Link::send(const OdometryMessage& message) {
-  if (!send(to_payload(message))) return;
   const std::lock_guard lock(mutex_);
-  ++counts_.odometry;
+  if (send(to_payload(message))) ++counts_.odometry;
 }
 
-void Link::send(const StatusText& message) { send(to_payload(message)); }
+void Link::send(const StatusText& message) {
+  const std::lock_guard lock(mutex_);
+  send(to_payload(message));
+}
 
 LinkCounts Link::counts() const {
   const std::lock_guard lock(mutex_);
@@ -44,17 +46,15 @@ LinkCounts Link::counts() const {
 }
 
 bool Link::send(const Payload& payload) {
-  const std::lock_guard lock(mutex_);  // packets of two threads must not mix
   const bool sent = transport_.send(to_bytes({sender_, sequence_++, payload}));
   if (!sent) ++counts_.dropped;
   return sent;
 }
 
 void Link::answer(const Packet& request) {
+  const std::lock_guard lock(mutex_);  // before the time is read, which shall be that of sending
   const std::optional<TimeSync> reply = answer_to(request, sender_, clock_());
-  if (!reply || !send(to_payload(*reply))) return;
-  const std::lock_guard lock(mutex_);
-  ++counts_.time_answers;
+  if (reply && send(to_payload(*reply))) ++counts_.time_answers;
 }
 
 void Link::converse() {
@@ -63,6 +63,7 @@ void Link::converse() {
   SteadyClock::time_point next_heartbeat = SteadyClock::now();
   while (!stop_) {
     if (SteadyClock::now() >= next_heartbeat) {
+      const std::lock_guard lock(mutex_);
       send(to_payload(Heartbeat{state_}));
       next_heartbeat += kHeartbeatInterval;
     }

@@ -45,7 +45,7 @@ class Link {
   [[nodiscard]] std::uint16_t local_port() const { return transport_.local_port(); }
 
  private:
-  bool send(const Payload& payload);
+  bool send(const Payload& payload);  ///< mutex_ is held: packets of two threads must not mix
   void answer(const Packet& request);
   void converse();
 
