@@ -64,19 +64,15 @@ class Ekf {
     return innovation;
   }
 
-  /// Gates each row by itself, then updates once with those for which admit(row, innovation) is true, their noise
-  /// divided by `weight`. True if there were any.
-  template <int kMax, typename Admit>
-  bool apply(GroundRows<kMax>& z, double weight, CameraUpdate calibration, const Admit& admit) {
-    int kept = 0;
+  /// Updates once with all rows, their noise divided by `weight`. They are whitened in place.
+  template <int kMax>
+  void apply(GroundRows<kMax>& z, double weight, CameraUpdate calibration) {
     for (int row = 0; row < z.count; ++row) {
-      if (!admit(row, test(z.H.row(row), z.residual(row), z.sigma(row)))) continue;
       const double whitening = weight / z.sigma(row);
-      z.H.row(kept) = whitening * z.H.row(row);
-      z.residual(kept++) = whitening * z.residual(row);
+      z.H.row(row) *= whitening;
+      z.residual(row) *= whitening;
     }
-    if (kept > 0) apply(z.H.topRows(kept), err::nu, z.residual.head(kept), calibration);
-    return kept > 0;
+    if (z.count > 0) apply(z.H.topRows(z.count), err::nu, z.residual.head(z.count), calibration);
   }
 
   /// Updates by whitened rows: residual = H e(first_column ...) + n, cov(n) = I.

@@ -7,6 +7,9 @@
 
 namespace ear {
 
+/// How long a source may be silent [s] that usually delivers every `interval` seconds; 0: not known.
+[[nodiscard]] double longest_silence(double interval);
+
 /// Mostly wrong for kFaultyAfter seconds, it is faulty; mostly right for kSoundAfter, it is sound again.
 class FaultState {
  public:

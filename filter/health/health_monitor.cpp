@@ -5,15 +5,13 @@
 namespace ear {
 namespace {
 
-constexpr double kMajority = 0.5;         // of the measurements of a wheel or beam
-constexpr double kMostOff = 0.5;          // of the features off their place: the images contradict the state
-constexpr int kFewTracks = 10;            // chosen
-constexpr double kSilent = 0.12;          // [s] chosen: without a reading,
-constexpr double kSilentIntervals = 2.5;  // chosen: and so many of the wheels' intervals
-constexpr double kStale = 0.5;            // [s] chosen: after which what the last frame showed holds no more
-constexpr double kTick = 0.03;            // [s] chosen: between two looks at silent sensors
-constexpr double kUnaided = 2.0;          // [s] chosen: that inertia alone may carry the estimate
-constexpr double kWorstVelocity = 1.0;    // [m/s] chosen: standard deviation of a velocity that is known,
+constexpr double kMajority = 0.5;        // of the measurements of a wheel or beam
+constexpr double kMostOff = 0.5;         // of the features off their place: the images contradict the state
+constexpr int kFewTracks = 10;           // chosen
+constexpr double kStale = 0.5;           // [s] chosen: after which what the last frame showed holds no more
+constexpr double kTick = 0.03;           // [s] chosen: between two looks at silent sensors
+constexpr double kUnaided = 2.0;         // [s] chosen: that inertia alone may carry the estimate
+constexpr double kWorstVelocity = 1.0;   // [m/s] chosen: standard deviation of a velocity that is known,
 constexpr double kWorstDirection = 0.2;  // [rad] or of its direction, if more: one that is fast need not know it better
 constexpr double kContradicted = 1.0;    // [s] chosen
 constexpr double kProof = 0.5;           // [s] chosen: for which an estimate that was lost must fit to be given again
@@ -164,9 +162,8 @@ void HealthMonitor::judge_ground(const Frame& frame, const std::array<SourceReco
     }
   };
   const TimeNs now_ns = arrivals_.imu_ns.value_or(frame.t_ns);
-  const bool no_reading =
-      seconds_between(arrivals_.encoder_ns, now_ns) > std::max(kSilent, kSilentIntervals * arrivals_.encoder_interval);
-  const bool no_range = seconds_between(arrivals_.laser_ns, now_ns) > kSilent;
+  const bool no_reading = seconds_between(arrivals_.encoder_ns, now_ns) > longest_silence(arrivals_.encoder_interval);
+  const bool no_range = seconds_between(arrivals_.laser_ns, now_ns) > longest_silence(0.0);
   if (!frame.lifted) {
     for (const Source wheel : {Source::wheel_left, Source::wheel_right}) judge(wheel, no_reading);
   }

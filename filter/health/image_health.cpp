@@ -14,8 +14,6 @@ constexpr int kFewTracks = 10;          // chosen
 constexpr double kSparse = 0.4;         // chosen: of the usual number of features
 constexpr double kTracksMemory = 20.0;  // [s] chosen
 constexpr double kFitMemory = 1.0;      // [s] chosen
-constexpr double kSilent = 0.12;        // [s] chosen: without a frame,
-constexpr double kMissedFrames = 2.5;   // chosen: and so many of its intervals
 constexpr double kSlowest = 0.5;        // [s] longer intervals are outages
 constexpr double kIntervalShare = 0.1;  // chosen: of each new interval in the usual one
 
@@ -78,8 +76,7 @@ void ImageHealth::report(TimeNs t_ns) {
 bool ImageHealth::misfit() const { return rejected_ > used_ && used_ + rejected_ >= kFewTracks; }
 
 bool ImageHealth::come(TimeNs t_ns) const {
-  return cameras_ > 0 && arrival_ns_ &&
-         seconds_between(*arrival_ns_, t_ns) < std::max(kSilent, kMissedFrames * interval_);
+  return cameras_ > 0 && arrival_ns_ && seconds_between(*arrival_ns_, t_ns) < longest_silence(interval_);
 }
 
 }  // namespace ear

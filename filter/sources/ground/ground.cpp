@@ -58,7 +58,7 @@ void Ground::update(const BeamRanges& reading, const ImuBuffer& imu, CameraUpdat
   z.residual(z.count) = -axle.lean;
   z.sigma(z.count) = std::sqrt(2.0) * config_.unevenness / x.odometer.track_width;
   weigh(z, running_.axle, reading.t_ns, ekf);
-  ekf.apply(z, 1.0, calibration, [](int, const Innovation&) { return true; });
+  ekf.apply(z, 1.0, calibration);
 }
 
 /// The newest row's noise grows with what did not fit. Nothing else shows the ground: where all beams contradict it,

@@ -42,7 +42,7 @@ void Wheels::update(const WheelIncrement& increment, const Context& context, Ekf
     z.residual(z.count) = rows.residual(row);
     z.sigma(z.count++) = sigma(row);
   }
-  ekf.apply(z, context.weight, context.calibration, [](int, const Innovation&) { return true; });
+  ekf.apply(z, context.weight, context.calibration);
 }
 
 void Wheels::count(const NoiseScore& score, FrameStatistics& statistics) {
