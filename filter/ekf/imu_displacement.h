@@ -17,13 +17,12 @@ struct ImuMotion {
   Eigen::Vector3d p_BiBj = Eigen::Vector3d::Zero();
   Eigen::Matrix3d R_BiBj = Eigen::Matrix3d::Identity();
   Eigen::Matrix<double, 3, err::imu_size> H = Eigen::Matrix<double, 3, err::imu_size>::Zero();  ///< p by the error at i
-  double position_variance = 0.0;  ///< of each axis, by the accelerometer's noise meanwhile [m^2]
-  double rotation_variance = 0.0;  ///< of each axis, by the gyroscope's [rad^2]
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< of p, by the noise of the samples meanwhile [m^2]
 };
 
 /// Integrates the samples from x.t_ns to `to_ns`.
 [[nodiscard]] ImuMotion imu_motion(const ImuState& x, const ImuBuffer& samples, TimeNs to_ns,
-                                   const ImuCalibration& noise);
+                                   const ImuCalibration& imu);
 
 /// `P`: covariance of the error at i.
 [[nodiscard]] Displacement imu_displacement(const ImuMotion& motion, const Covariance& P);

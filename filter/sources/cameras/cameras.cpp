@@ -13,12 +13,12 @@ namespace {
 constexpr double kBridgeRotation = 2e-3;  // [rad] chosen: standard deviations with which two images show the motion:
 constexpr double kBridgePosition = 5e-3;  // [m] well above what the features will show later
 constexpr int kBridgeRows = 6;
-constexpr double kApparent = 3.0;          // standard deviations of the cameras' calibration that look like a turn
-constexpr double kOldImage = 0.5;          // [s] chosen: after which frames have little in common
-constexpr double kRecent = 0.3;            // [s] chosen: an image shows the motion for so long
-constexpr std::size_t kFewFeatures = 10;   // chosen: fewer show too little of the motion, as for health
-constexpr double kNoisy = 1.25;            // chosen: times the usual noise of a feature; less may be chance
-constexpr std::size_t kMaxCompared = 512;  // features of a frame whose motion is compared with other sensors
+constexpr double kApparent = 3.0;         // standard deviations of the cameras' calibration that look like a turn
+constexpr double kOldImage = 0.5;         // [s] chosen: after which frames have little in common
+constexpr double kComparedStep = 1e-5;    // [rad, m] chosen: a hundredth of what two images show
+constexpr double kRecent = 0.3;           // [s] chosen: an image shows the motion for so long
+constexpr std::size_t kFewFeatures = 10;  // chosen: fewer show too little of the motion, as for health
+constexpr double kNoisy = 1.25;           // chosen: times the usual noise of a feature; less may be chance
 
 }  // namespace
 
@@ -30,9 +30,9 @@ Cameras::Cameras(const FilterConfig& config, const Calibration& calibration)
       track_update_(config, focal_px_, count_),
       window_(config, focal_px_),
       frame_check_(config.feature_sigma_px / focal_px_, Gate(config.gate_probability, 2)),
-      displacement_(config.feature_sigma_px / focal_px_, kMaxCompared),
       rows_(kBridgeRows, err::clone(config.window + 1)) {
   last_features_.features.reserve(kFeatureCapacity);
+  compared_.features.reserve(kFeatureCapacity);
 }
 
 void Cameras::measure_noise(const FeatureFrame& frame, const CameraState& cameras) {
@@ -43,11 +43,19 @@ void Cameras::measure_noise(const FeatureFrame& frame, const CameraState& camera
 }
 
 Displacement Cameras::displacement(const FeatureFrame& frame, TimeNs t_ns, const ImuMotion& motion, const Ekf& ekf) {
-  if (ekf.state().imu.t_ns != compared_ns_) displacement_.clear();  // the frame before was not where the state is
+  Displacement result;
+  if (ekf.state().imu.t_ns == compared_ns_) {  // else the frame before was not where the state is
+    const std::vector<StereoMatch>& matches = matches_.find(compared_, frame);
+    const std::optional<StereoMotion> seen = stereo_motion(matches, ekf.state().camera, {motion.R_BiBj, motion.p_BiBj},
+                                                           config_.feature_sigma_px / focal_px_, kComparedStep);
+    result.available = seen.has_value();
+    result.contradictory = !seen && matches.size() >= kFewestMatches;
+    if (seen) result.p_BiBj = seen->p_B0B1;
+    if (seen) result.covariance = seen->covariance;
+  }
   compared_ns_ = t_ns;
-  const double bias =
-      motion.duration * motion.duration * ekf.covariance().matrix().diagonal().segment<3>(err::b_g).maxCoeff();
-  return displacement_.add(frame, ekf.state().camera, motion.R_BiBj, motion.rotation_variance + bias);
+  compared_ = frame;
+  return result;
 }
 
 Pose Cameras::image_pose(const State& x) const {
@@ -161,7 +169,7 @@ bool Cameras::show_motion(const State& x) const {
 void Cameras::reset() {
   tracks_.clear();
   window_.reset();
-  displacement_.clear();
+  compared_ns_ = 0;
   if (last_) last_->clone.reset();
 }
 

@@ -10,7 +10,6 @@
 #include "filter/ekf/ekf.h"
 #include "filter/ekf/imu_displacement.h"
 #include "filter/ekf/records.h"
-#include "filter/sources/cameras/camera_displacement.h"
 #include "filter/sources/cameras/frame_check.h"
 #include "filter/sources/cameras/image_noise.h"
 #include "filter/sources/cameras/stereo_motion.h"
@@ -55,9 +54,9 @@ class Cameras {
   void update(const FeatureFrame& frame, double weight, CameraUpdate calibration, Ekf& ekf, Records& records);
   /// The body's pose joins the window, without an image.
   void clone_without_image(double weight, Ekf& ekf);
-  /// The state is as well known as if features had updated it.
   /// Did an image with features enough come not long ago?
   [[nodiscard]] bool show_motion(const State& x) const;
+  /// The state is as well known as if features had updated it.
   void set_updated(TimeNs t_ns) { window_.set_updated(t_ns); }
 
   /// The frame was used; the next one is compared with it.
@@ -85,8 +84,8 @@ class Cameras {
   double noise_ = 1.0;  ///< standard deviation of the features of the frame at hand, times the usual
   FrameCheck frame_check_;
   StereoMatches matches_;
-  CameraDisplacement displacement_;
-  TimeNs compared_ns_ = 0;  ///< where the last interval of displacement() ended
+  FeatureFrame compared_;   ///< that displacement() last saw,
+  TimeNs compared_ns_ = 0;  ///< at this IMU time
   std::optional<LastImage> last_;
   FeatureFrame last_features_;
   Eigen::MatrixXd rows_;  // memory that is used again

@@ -12,11 +12,9 @@ namespace ear {
 namespace {
 
 constexpr int kIterations = 12;
-constexpr int kFewest = 12;           // features that fit
 constexpr double kLeastShare = 0.6;   // of the features that fit
 constexpr double kHuber = 2.0;        // [standard deviations] from where an observation weighs less
 constexpr double kFits = 3.5;         // [standard deviations] of an observation that does
-constexpr double kSettled = 1e-8;     // step [rad, m]
 constexpr double kLeastDepth = 1e-3;  // of a scaled point: smaller is beside or behind the camera
 
 /// A point of frame 0, times its inverse depth, in B0.
@@ -130,10 +128,10 @@ double stereo_inverse_depth(const CameraState& cameras, const Eigen::Vector2d& l
 }
 
 std::optional<StereoMotion> stereo_motion(const std::vector<StereoMatch>& matches, const CameraState& cameras,
-                                          const StereoMotion& start, double sigma) {
+                                          const StereoMotion& start, double sigma, double settled) {
   StereoMotion motion = start;
   motion.matches = static_cast<int>(matches.size());
-  if (motion.matches < kFewest) return std::nullopt;
+  if (motion.matches < static_cast<int>(kFewestMatches)) return std::nullopt;
   const Problem problem(matches, cameras, sigma);
   for (int iteration = 0; iteration < kIterations; ++iteration) {
     const NormalEquations sums = problem.step(motion, motion.fitting);
@@ -143,9 +141,10 @@ std::optional<StereoMotion> stereo_motion(const std::vector<StereoMatch>& matche
     motion.R_B0B1 = motion.R_B0B1 * exp_so3(step.head<3>());
     motion.p_B0B1 += step.tail<3>();
     motion.covariance = ldlt.solve(Eigen::Matrix<double, 6, 6>::Identity()).bottomRightCorner<3, 3>();
-    if (step.norm() < kSettled) break;
+    if (step.norm() < settled) break;
   }
-  const bool together = motion.fitting >= kFewest && motion.fitting >= kLeastShare * motion.matches;
+  const bool together =
+      motion.fitting >= static_cast<int>(kFewestMatches) && motion.fitting >= kLeastShare * motion.matches;
   if (!together || !(motion.covariance.diagonal().minCoeff() > 0.0)) return std::nullopt;
   return motion;
 }

@@ -36,6 +36,9 @@ class StereoMatches {
 [[nodiscard]] double stereo_inverse_depth(const CameraState& cameras, const Eigen::Vector2d& left,
                                           const Eigen::Vector2d& right);
 
+/// Fewer features show no motion.
+inline constexpr std::size_t kFewestMatches = 12;
+
 /// The motion from frame 0 to frame 1.
 struct StereoMotion {
   Eigen::Matrix3d R_B0B1 = Eigen::Matrix3d::Identity();
@@ -47,9 +50,10 @@ struct StereoMotion {
 
 /// Least squares over rotation and translation: the points seen in frame 0, projected into both cameras of frame 1.
 /// Observations further off than `huber` standard deviations weigh less. `sigma`: one observation, normalized; `start`:
-/// where to begin. Nothing if the points do not show it, or most of them do not move as one body.
+/// where to begin, `settled` [rad, m]: steps with which it ends. Nothing if the points do not show it, or most of them
+/// do not move as one body.
 [[nodiscard]] std::optional<StereoMotion> stereo_motion(const std::vector<StereoMatch>& matches,
                                                         const CameraState& cameras, const StereoMotion& start,
-                                                        double sigma);
+                                                        double sigma, double settled = 1e-8);
 
 }  // namespace ear
