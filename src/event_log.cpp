@@ -52,7 +52,8 @@ void EventLog::note_unusable(TimeNs t_ns, const std::string& reason) {
 /// that stays is written in the end.
 void EventLog::note_health(TimeNs t_ns, const Health& health) {
   const bool same = health.status == written_.status && health.reason == written_.reason &&
-                    health.faulty == written_.faulty && health.load_step == written_.load_step &&
+                    health.faulty == written_.faulty && health.aiding == written_.aiding &&
+                    health.imprecise == written_.imprecise && health.load_step == written_.load_step &&
                     health.reset_counter == written_.reset_counter;
   if (same) return;
   const std::string text = to_text(health);

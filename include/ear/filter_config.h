@@ -121,7 +121,7 @@ struct FilterConfig {
   int max_track_updates = 40;          ///< features used per frame, those with most observations first
   double feature_sigma_px = 0.6;       ///< one observation of one feature, one axis [px]
   double huber_px = 1.5;               ///< observations further off than this weigh less [px]
-  double gate_probability = 0.997;     ///< chi-square gate of every feature and row
+  double gate_probability = 0.98;      ///< chi-square gate of every feature and row
   double keyframe_parallax_px = 12.0;  ///< a clone with less median parallax to its elder makes room first [px]
   double max_imu_gap = 0.05;           ///< [s] a longer gap in the IMU data is bridged, counted, and its noise raised
   PriorConfig prior;

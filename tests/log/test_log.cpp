@@ -118,6 +118,12 @@ TEST_CASE("event log: each change of the health once, lost as a warning") {
   CHECK(note(11.1) == "info: at 11.100 s: tracking\n");  // but it lasts
   health.load_step = 2;
   CHECK(contains(note(11.2), "load step 2"));
+  health.status = HealthStatus::degraded;
+  CHECK(contains(note(11.3), "degraded"));
+  health.imprecise = true;
+  CHECK(contains(note(11.4), "imprecise"));
+  health.aiding = Aiding::cameras;
+  CHECK(contains(note(11.5), "carried by cameras"));
 }
 
 TEST_CASE("event log: what is refused is a warning, every ten seconds") {
