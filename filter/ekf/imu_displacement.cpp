@@ -1,5 +1,7 @@
 #include "filter/ekf/imu_displacement.h"
 
+#include <algorithm>
+
 #include "filter/ekf/propagation.h"
 
 namespace ear {
@@ -10,14 +12,22 @@ ImuMotion imu_motion(const ImuState& x, const ImuBuffer& samples, TimeNs to_ns, 
   ImuMotion motion;
   ImuState end = x;
   end.p_WB.setZero();
-  ErrorTransition error;
+  const ImuState begin = end;
+  Eigen::Vector3d turned_B = Eigen::Vector3d::Zero(), gained_B = Eigen::Vector3d::Zero();
+  ImuNoiseFactors worst;
   samples.for_each_piece(
       x.t_ns, to_ns,
       [&](const Eigen::Vector3d& gyro_B, const Eigen::Vector3d& accel_B, double dt, const ImuNoiseFactors& factors) {
-        chain(error, error_transition(end, gyro_B, accel_B, dt, with_factors(imu, factors)));
         end = integrate(end, gyro_B, accel_B, dt);
+        turned_B += gyro_B * dt;
+        gained_B += accel_B * dt;
+        worst = {std::max(worst.gyro, factors.gyro), std::max(worst.accel, factors.accel)};
         motion.duration += dt;
       });
+  if (!(motion.duration > 0.0)) return motion;
+  // The error goes on as if all samples were their mean: a frame is short.
+  const ErrorTransition error = error_transition(begin, turned_B / motion.duration, gained_B / motion.duration,
+                                                 motion.duration, with_factors(imu, worst));
   const Eigen::Matrix3d R_BW = x.R_WB.transpose();
   motion.p_BiBj = R_BW * end.p_WB;
   motion.R_BiBj = R_BW * end.R_WB;

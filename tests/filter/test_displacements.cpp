@@ -18,16 +18,18 @@ namespace {
 
 constexpr TimeNs kStart = 1'000'000'000;
 constexpr TimeNs kEnd = kStart + 200'000'000;
+constexpr double kMeanOfSamples = 0.03;  // of H: the error goes on by the mean of the samples
 
-/// A vehicle that turns and shakes, 200 samples a second.
-ImuBuffer random_samples(std::mt19937_64& rng, const State& x, double accel_noise = 0.0) {
+/// A vehicle that turns and, if `shakes`, shakes; 200 samples a second.
+ImuBuffer random_samples(std::mt19937_64& rng, const State& x, double accel_noise = 0.0, double shakes = 1.0) {
   std::mt19937_64 motion{5};
   ImuBuffer buffer(256);
   for (TimeNs t_ns = kStart - 50'000'000; t_ns <= kEnd + 50'000'000; t_ns += 5'000'000) {
     ImuSample sample;
     sample.t_ns = t_ns;
-    sample.gyro_B = Eigen::Vector3d(0.2, -0.3, 1.0) + random_vector(motion, 0.1) + x.imu.b_g;
-    sample.accel_B = Eigen::Vector3d(1.0, 0.5, 9.8) + random_vector(motion, 0.5) + random_vector(rng, accel_noise);
+    sample.gyro_B = Eigen::Vector3d(0.2, -0.3, 1.0) + shakes * random_vector(motion, 0.1) + x.imu.b_g;
+    sample.accel_B =
+        Eigen::Vector3d(1.0, 0.5, 9.8) + shakes * random_vector(motion, 0.5) + random_vector(rng, accel_noise);
     buffer.push(sample);
   }
   return buffer;
@@ -89,13 +91,18 @@ TEST_CASE("displacements: the IMU's is where propagation takes the body, and H i
     CHECK((motion.p_BiBj - x.imu.R_WB.transpose() * (end.p_WB - x.imu.p_WB)).norm() < 1e-9);
     CHECK((motion.R_BiBj - x.imu.R_WB.transpose() * end.R_WB).norm() < 1e-9);
     CHECK(motion.duration == doctest::Approx(0.2));
-    check_jacobian(
-        [&](const Eigen::VectorXd& d) -> Eigen::VectorXd {
-          Eigen::VectorXd error = Eigen::VectorXd::Zero(x.error_size());
-          error.head<err::imu_size>() = d;
-          return imu_motion(boxplus(x, error).imu, samples, kEnd, ImuCalibration{}).p_BiBj;
-        },
-        motion.H);
+    const ImuBuffer steady = random_samples(rng, x, 0.0, 0.0);
+    const auto moved = [&](const ImuBuffer& measured, const Eigen::VectorXd& d) -> Eigen::VectorXd {
+      Eigen::VectorXd error = Eigen::VectorXd::Zero(x.error_size());
+      error.head<err::imu_size>() = d;
+      return imu_motion(boxplus(x, error).imu, measured, kEnd, ImuCalibration{}).p_BiBj;
+    };
+    check_jacobian([&](const Eigen::VectorXd& d) { return moved(steady, d); },
+                   imu_motion(x.imu, steady, kEnd, ImuCalibration{}).H, 1e-3);
+    const Eigen::VectorXd error = 0.01 * Eigen::VectorXd::Ones(err::imu_size);
+    const Eigen::VectorXd none = Eigen::VectorXd::Zero(err::imu_size);
+    const Eigen::VectorXd change = moved(samples, error) - moved(samples, none);
+    CHECK((change - motion.H * error).norm() < kMeanOfSamples * change.norm());
   }
 }
 

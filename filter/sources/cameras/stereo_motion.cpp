@@ -17,77 +17,93 @@ constexpr double kHuber = 2.0;        // [standard deviations] from where an obs
 constexpr double kFits = 3.5;         // [standard deviations] of an observation that does
 constexpr double kLeastDepth = 1e-3;  // of a scaled point: smaller is beside or behind the camera
 
-/// A point of frame 0, times its inverse depth, in B0.
-struct ScaledPoint {
-  Eigen::Vector3d g;
-  double s = 0.0;  // inverse depth [1/m]
-};
-
-ScaledPoint point_of(const StereoMatch& match, const CameraState& cameras) {
-  const double s = stereo_inverse_depth(cameras, match.left0, match.right0);
-  return {cameras.T_BC0.R * match.left0.homogeneous() + s * cameras.T_BC0.p, s};
-}
-
 /// Sums of one Gauss-Newton step over (rotation, translation).
 struct NormalEquations {
   Eigen::Matrix<double, 6, 6> A = Eigen::Matrix<double, 6, 6>::Zero();
   Eigen::Matrix<double, 6, 1> b = Eigen::Matrix<double, 6, 1>::Zero();
 };
 
+/// A camera of frame 1. A point of frame 0 with the ray x and the inverse depth s, both in the left camera, is at
+/// h = R x + s p in it, times its inverse depth. The sums are over a turn and a shift of the points in this camera:
+/// dh = [h]x theta - s tau.
+struct View {
+  Eigen::Matrix3d R;
+  Eigen::Vector3d p;
+  NormalEquations sums;
+
+  /// One observation; whether it fits.
+  bool add(const Eigen::Vector2d& ray, double s, const Eigen::Vector2d& uv, double sigma) {
+    const Eigen::Vector3d h = R * ray.homogeneous() + s * p;
+    if (h.z() < kLeastDepth) return false;
+    const double u = h.x() / h.z();
+    const double v = h.y() / h.z();
+    const double q = s / h.z();
+    Eigen::Matrix<double, 2, 6> H;
+    H << u * v, -(1.0 + u * u), v, -q, 0.0, q * u,  //
+        1.0 + v * v, -u * v, -u, 0.0, -q, q * v;
+    const Eigen::Vector2d r = uv - Eigen::Vector2d(u, v);
+    const double distance = r.norm() / sigma;
+    const double weight = (distance > kHuber ? kHuber / distance : 1.0) / (sigma * sigma);
+    sums.A.noalias() += H.transpose() * (weight * H);
+    sums.b.noalias() += H.transpose() * (weight * r);
+    return distance < kFits;
+  }
+};
+
 class Problem {
  public:
   Problem(const std::vector<StereoMatch>& matches, const CameraState& cameras, double sigma)
-      : matches_(matches), state_(cameras), sigma_(sigma) {
+      : matches_(matches), state_(cameras), sigma_(sigma), baseline_(cameras.T_C0C1.p.norm()) {
     const Pose& T_BC0 = cameras.T_BC0;
-    cameras_[0] = T_BC0;
-    cameras_[1] = {T_BC0.R * cameras.T_C0C1.R, T_BC0.R * cameras.T_C0C1.p + T_BC0.p};
-    baseline_ = cameras.T_C0C1.p.norm();
+    T_BC_[0] = T_BC0;
+    T_BC_[1] = {T_BC0.R * cameras.T_C0C1.R, T_BC0.R * cameras.T_C0C1.p + T_BC0.p};
   }
 
   /// One step from `x`. `fitting`: how many features fit.
   NormalEquations step(const StereoMotion& x, int& fitting) const {
-    NormalEquations sums;
+    std::array<View, 2> views = {view_of(T_BC_[0], x), view_of(T_BC_[1], x)};
     fitting = 0;
     // A depth's error moves the point in frame 1 by its parallax, which is in proportion to the motion.
     const double share = std::sqrt(2.0) * x.p_B0B1.norm() / baseline_;
     const double sigma = sigma_ * std::sqrt(1.0 + share * share);
     for (const StereoMatch& match : matches_) {
-      const ScaledPoint point = point_of(match, state_);  // anew in each step: cheaper than memory for all of them
-      if (point.s < 0.0) continue;                        // behind the cameras
-      bool fits = add(x, point, cameras_[0], match.left1, sigma, sums);
-      if (match.has_right1) fits = add(x, point, cameras_[1], match.right1, sigma, sums) && fits;
+      const double s = stereo_inverse_depth(state_, match.left0, match.right0);  // cheaper than memory for all of them
+      if (s < 0.0) continue;                                                     // behind the cameras
+      bool fits = views[0].add(match.left0, s, match.left1, sigma);
+      if (match.has_right1) fits = views[1].add(match.left0, s, match.right1, sigma) && fits;
       fitting += fits ? 1 : 0;
+    }
+    NormalEquations sums;
+    for (std::size_t k = 0; k < views.size(); ++k) {
+      const Eigen::Matrix<double, 6, 6> J = camera_by_body(T_BC_[k], x);
+      sums.A += J.transpose() * views[k].sums.A * J;
+      sums.b += J.transpose() * views[k].sums.b;
     }
     return sums;
   }
 
  private:
-  static bool add(const StereoMotion& x, const ScaledPoint& point, const Pose& T_BC, const Eigen::Vector2d& uv,
-                  double sigma, NormalEquations& sums) {
-    const Eigen::Vector3d moved = x.R_B0B1.transpose() * (point.g - point.s * x.p_B0B1);
-    const Eigen::Vector3d h = T_BC.R.transpose() * (moved - point.s * T_BC.p);
-    if (h.z() < kLeastDepth) return false;
-    const Eigen::Vector2d predicted = h.hnormalized();
-    Eigen::Matrix<double, 2, 3> J_h;
-    J_h << 1.0, 0.0, -predicted.x(), 0.0, 1.0, -predicted.y();
-    J_h /= h.z();
-    const Eigen::Matrix<double, 2, 3> J = J_h * T_BC.R.transpose();
-    Eigen::Matrix<double, 2, 6> H;  // R_B0B1 Exp(theta): moved turns against it
-    H.leftCols<3>() = J * skew(moved);
-    H.rightCols<3>() = -point.s * J * x.R_B0B1.transpose();
-    const Eigen::Vector2d r = uv - predicted;
-    const double distance = r.norm() / sigma;
-    const double weight = (distance > kHuber ? kHuber / distance : 1.0) / (sigma * sigma);
-    sums.A.noalias() += weight * H.transpose() * H;
-    sums.b.noalias() += weight * H.transpose() * r;
-    return distance < kFits;
+  [[nodiscard]] View view_of(const Pose& T_BC, const StereoMotion& x) const {
+    const Eigen::Matrix3d R_CB0 = T_BC.R.transpose() * x.R_B0B1.transpose();
+    const Pose& T_BC0 = T_BC_[0];
+    return {R_CB0 * T_BC0.R, R_CB0 * (T_BC0.p - x.p_B0B1) - T_BC.R.transpose() * T_BC.p, {}};
+  }
+
+  /// (theta, tau) in a camera by the turn of R_B0B1 and the shift of p_B0B1.
+  static Eigen::Matrix<double, 6, 6> camera_by_body(const Pose& T_BC, const StereoMotion& x) {
+    const Eigen::Matrix3d R_CB = T_BC.R.transpose();
+    Eigen::Matrix<double, 6, 6> J = Eigen::Matrix<double, 6, 6>::Zero();
+    J.topLeftCorner<3, 3>() = R_CB;
+    J.bottomLeftCorner<3, 3>() = -R_CB * skew(T_BC.p);
+    J.bottomRightCorner<3, 3>() = R_CB * x.R_B0B1.transpose();
+    return J;
   }
 
   const std::vector<StereoMatch>& matches_;
   const CameraState& state_;
   double sigma_;
   double baseline_;
-  std::array<Pose, 2> cameras_;  // in B
+  std::array<Pose, 2> T_BC_;
 };
 
 }  // namespace
