@@ -80,3 +80,9 @@ TEST_CASE("anomaly: wheels that slip, and a camera whose image freezes, are name
   const Alarms frozen = alarms_during("camera_frozen", config);
   CHECK(share(frozen.named[static_cast<std::size_t>(MotionSensor::camera)], frozen) > 0.9);
 }
+
+TEST_CASE("anomaly: a dark image is noisy, not wrong: the camera goes on to be compared, and is not named") {
+  const Alarms dark = alarms_during("camera_dark", FilterConfig{});
+  REQUIRE(dark.frames > 100.0);
+  CHECK(share(dark.named[static_cast<std::size_t>(MotionSensor::camera)], dark) < 0.05);
+}

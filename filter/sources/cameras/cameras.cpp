@@ -46,8 +46,8 @@ Displacement Cameras::displacement(const FeatureFrame& frame, TimeNs t_ns, const
   Displacement result;
   if (ekf.state().imu.t_ns == compared_ns_) {  // else the frame before was not where the state is
     const std::vector<StereoMatch>& matches = matches_.find(compared_, frame);
-    const std::optional<StereoMotion> seen = stereo_motion(matches, ekf.state().camera, {motion.R_BiBj, motion.p_BiBj},
-                                                           config_.feature_sigma_px / focal_px_, kComparedStep);
+    const std::optional<StereoMotion> seen =
+        stereo_motion(matches, ekf.state().camera, {motion.R_BiBj, motion.p_BiBj}, feature_sigma(), kComparedStep);
     result.available = seen.has_value();
     result.contradictory = !seen && matches.size() >= kFewestMatches;
     if (seen) result.p_BiBj = seen->p_B0B1;
@@ -81,7 +81,7 @@ bool Cameras::bridge(const FeatureFrame& frame, Ekf& ekf) {
   start.R_B0B1 = moved.R;
   start.p_B0B1 = moved.p;
   const std::optional<StereoMotion> motion =
-      stereo_motion(matches_.find(last_features_, frame), x.camera, start, config_.feature_sigma_px / focal_px_);
+      stereo_motion(matches_.find(last_features_, frame), x.camera, start, feature_sigma());
   if (!motion) return false;
   const int newest = static_cast<int>(x.clones.size()) - 1;
   const RelativeMotionRows rows = linearize_relative_motion(x, newest, {motion->R_B0B1, motion->p_B0B1});

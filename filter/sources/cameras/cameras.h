@@ -70,6 +70,8 @@ class Cameras {
   void reset();
 
  private:
+  /// Of one observation in the newest frame, normalized.
+  [[nodiscard]] double feature_sigma() const { return noise_ * config_.feature_sigma_px / focal_px_; }
   [[nodiscard]] Pose motion_since_image(const State& x) const;
   [[nodiscard]] double apparent_rate(double dt, const Ekf& ekf) const;
   void marginalise(std::optional<std::size_t> clone, Ekf& ekf);
