@@ -1,0 +1,89 @@
+#include "tools/live_sources.h"
+
+#include <cmath>
+
+#include "src/log/log.h"
+#include "src/mavlink/odometry_message.h"
+#include "src/recording/calibration_files.h"
+#include "src/recording/input_error.h"
+
+namespace ear::tools {
+namespace {
+
+Eigen::Matrix3d mounting(const live::MavlinkSettings& settings, const Calibration& calibration) {
+  constexpr double kDegree = M_PI / 180.0;
+  if (settings.mounting_deg) {
+    const auto& [roll, pitch, yaw] = *settings.mounting_deg;
+    return mavlink::mounting_of(roll * kDegree, pitch * kDegree, yaw * kDegree);
+  }
+  if (calibration.encoder) return mavlink::mounting_of(*calibration.encoder);
+  throw InputError("mavlink: mounting_deg: how does the IMU sit in the vehicle? Without wheels nothing else says so");
+}
+
+void require_usable(const Calibration& calibration, const std::filesystem::path& folder) {
+  std::vector<Finding> findings = check_calibration(calibration);
+  if (const auto missing = check_sensors(calibration)) findings.push_back(*missing);
+  for (const Finding& finding : findings) {
+    const std::string where = located(folder, 0, finding.where, finding.message);
+    if (finding.severity == Severity::error) throw InputError(where);
+    log_warning(where);
+  }
+}
+
+}  // namespace
+
+Calibration live_calibration(const live::LiveSettings& settings, const live::Player* player) {
+  if (settings.calibration.empty()) {
+    if (player != nullptr) return player->calibration();
+    throw InputError(located(settings.file, 0, "calibration", "missing: a folder with <sensor>/sensor.yaml"));
+  }
+  Warnings warnings;
+  const Calibration calibration =
+      load_calibration(find_mav0(settings.calibration), settings.kalibr, warnings);
+  for (const Warning& warning : warnings.list()) log_warning(warning.kind + ": " + warning.first);
+  require_usable(calibration, settings.calibration);
+  return calibration;
+}
+
+MavlinkLines::MavlinkLines(const std::vector<live::MavlinkSettings>& settings, live::Intake& intake) {
+  for (const live::MavlinkSettings& one : settings) {
+    Line line;
+    mavlink::LinkListener listener;
+    if (one.inputs.any()) {
+      line.sensors = std::make_unique<live::MavlinkSensors>(one.inputs, intake);
+      listener.on_packet = [sensors = line.sensors.get()](const mavlink::Packet& packet) { sensors->take(packet); };
+      listener.asks_time = true;
+    }
+    const mavlink::Sender self{static_cast<std::uint8_t>(one.system)};
+    const live::LiveClock& clock = intake.clock();
+    line.link = std::make_unique<mavlink::Link>(one.address, self, [&clock] { return clock.now(); }, listener);
+    if (one.send) {
+      line.output = std::make_unique<live::MavlinkOutput>(*line.link, mounting(one, intake.calibration()),
+                                                          intake.calibration().imu);
+    }
+    lines_.push_back(std::move(line));
+  }
+}
+
+void MavlinkLines::take(const live::LiveSample& sample) {
+  for (Line& line : lines_) {
+    if (line.output) line.output->take(sample);
+  }
+}
+
+void MavlinkLines::take(const live::LiveFrame& frame) {
+  for (Line& line : lines_) {
+    if (line.output) line.output->take(frame);
+  }
+}
+
+std::vector<std::string> MavlinkLines::look() {
+  std::vector<std::string> words;
+  for (Line& line : lines_) {
+    if (!line.sensors) continue;
+    for (std::string& text : line.sensors->look()) words.push_back(std::move(text));
+  }
+  return words;
+}
+
+}  // namespace ear::tools

@@ -1,0 +1,38 @@
+// What `ear live` reads: opens the sources that its settings name.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "src/live/live_settings.h"
+#include "src/live/mavlink_output.h"
+#include "src/live/player.h"
+
+namespace ear::tools {
+
+/// The calibration that the settings name, or else that of the recording that is played. Throws InputError where there
+/// is none, or it cannot be used.
+[[nodiscard]] Calibration live_calibration(const live::LiveSettings& settings, const live::Player* player);
+
+/// The lines to flight controllers and microcontrollers. A line's thread runs as long as this lives.
+class MavlinkLines {
+ public:
+  MavlinkLines(const std::vector<live::MavlinkSettings>& settings, live::Intake& intake);
+
+  /// By the estimator's thread.
+  void take(const live::LiveSample& sample);
+  void take(const live::LiveFrame& frame);
+  [[nodiscard]] std::vector<std::string> look();
+
+ private:
+  struct Line {
+    std::unique_ptr<live::MavlinkSensors> sensors;
+    std::unique_ptr<live::MavlinkOutput> output;
+    std::unique_ptr<mavlink::Link> link;
+  };
+
+  std::vector<Line> lines_;
+};
+
+}  // namespace ear::tools
