@@ -1,6 +1,7 @@
 #include "src/live/intake.h"
 
-#include <cstdio>
+#include <algorithm>
+#include <limits>
 #include <utility>
 
 namespace ear::live {
@@ -42,6 +43,14 @@ bool Intake::add(const QueuedOdometry::Ranges& ranges) {
   const bool taken = estimator_.add_laser(ranges);
   if (taken && taps_.laser) taps_.laser(ranges);
   return taken;
+}
+
+bool Intake::add(const LaserSample& sample) {
+  QueuedOdometry::Ranges ranges;
+  ranges.t_ns = sample.t_ns;
+  ranges.range.fill(std::numeric_limits<double>::quiet_NaN());
+  std::copy_n(sample.range.begin(), std::min(sample.range.size(), ranges.range.size()), ranges.range.begin());
+  return add(ranges);
 }
 
 bool Intake::add(const StereoFrame& frame) {

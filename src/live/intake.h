@@ -31,6 +31,7 @@ class Intake {
   bool add(const ImuSample& sample);
   bool add(const EncoderSample& sample);
   bool add(const QueuedOdometry::Ranges& ranges);
+  bool add(const LaserSample& sample);  ///< the same
   /// Images of another size than the calibration's are refused, which is said once in ten seconds.
   bool add(const StereoFrame& frame);
 

@@ -1,10 +1,8 @@
 #include "src/live/player.h"
 
-#include <algorithm>
 #include <chrono>
 #include <condition_variable>
 #include <deque>
-#include <limits>
 #include <mutex>
 #include <utility>
 
@@ -14,14 +12,6 @@ namespace {
 using SteadyClock = std::chrono::steady_clock;
 constexpr std::size_t kAhead = 64;  // samples that wait for their time
 constexpr std::size_t kFramesAhead = 8;
-
-QueuedOdometry::Ranges to_ranges(const LaserSample& sample) {
-  QueuedOdometry::Ranges ranges;
-  ranges.t_ns = sample.t_ns;
-  ranges.range.fill(std::numeric_limits<double>::quiet_NaN());
-  std::copy_n(sample.range.begin(), std::min(sample.range.size(), ranges.range.size()), ranges.range.begin());
-  return ranges;
-}
 
 /// One sensor's thread: takes samples that were dealt to it, and waits until it is time for each.
 class Sensor {
@@ -78,8 +68,7 @@ class Sensor {
   }
 
   void hand_in(const Sample& sample) {
-    std::visit(Overloaded{[this](const LaserSample& s) { intake_.add(to_ranges(s)); },
-                          [this](const RecordedFrame& s) { intake_.add(static_cast<const StereoFrame&>(s)); },
+    std::visit(Overloaded{[this](const RecordedFrame& s) { intake_.add(static_cast<const StereoFrame&>(s)); },
                           [this](const auto& s) { intake_.add(s); }},
                sample);
   }
