@@ -11,6 +11,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr int kMostDomain = 232;
 constexpr double kBudgetShare = 0.7;  // of the time between two frames
 
 /// Relative to the folder of the configuration file.
@@ -70,6 +71,26 @@ CameraSettings load_cameras(const YamlMap& map, const fs::path& file) {
   return settings;
 }
 
+RosSettings load_ros(const YamlMap& map) {
+  map.require_only({"domain", "publish", "odometry", "predicted", "path", "diagnostics", "odom_frame", "base_frame", "tf"});
+  RosSettings settings;
+  if (map.has("domain")) {
+    settings.domain = map.get<int>("domain");
+    if (*settings.domain < 0 || *settings.domain > kMostDomain) throw map.error("domain", "0 to 232 expected");
+  }
+  settings.publish = map.get_or("publish", settings.publish);
+  RosNames& names = settings.names;
+  names.odometry = map.get_or("odometry", names.odometry);
+  names.predicted = map.get_or("predicted", names.predicted);
+  names.path = map.get_or("path", names.path);
+  names.diagnostics = map.get_or("diagnostics", names.diagnostics);
+  names.odom_frame = map.get_or("odom_frame", names.odom_frame);
+  names.base_frame = map.get_or("base_frame", names.base_frame);
+  names.tf = map.get_or("tf", names.tf);
+  if (names.odometry.empty() || names.diagnostics.empty()) throw map.error("odometry", "a topic's name expected");
+  return settings;
+}
+
 LogOptions load_log(const YamlMap& map, const fs::path& file) {
   map.require_only({"level", "file", "megabytes", "older_files"});
   static const std::map<std::string, LogLevel> kLevels{
@@ -92,7 +113,7 @@ LogOptions load_log(const YamlMap& map, const fs::path& file) {
 
 LiveSettings load_live_settings(const fs::path& file) {
   const YamlMap map = YamlMap::load(file);
-  map.require_only({"calibration", "kalibr", "settings", "budget_ms", "frame_slots", "mavlink", "cameras", "log"});
+  map.require_only({"calibration", "kalibr", "settings", "budget_ms", "frame_slots", "mavlink", "cameras", "ros", "topics", "log"});
   LiveSettings settings;
   settings.file = file;
   if (map.has("calibration")) settings.calibration = path_of(file, map.get<std::string>("calibration"));
@@ -111,6 +132,8 @@ LiveSettings load_live_settings(const fs::path& file) {
     for (const YamlMap& line : map.children("mavlink")) settings.mavlink.push_back(load_mavlink(line));
   }
   if (map.has("cameras")) settings.cameras = load_cameras(map.child("cameras"), file);
+  if (map.has("ros")) settings.ros = load_ros(map.child("ros"));
+  if (map.has("topics") && !settings.ros) throw map.error("topics", "without `ros`, which reads them");
   settings.log.level = LogLevel::info;
   if (map.has("log")) settings.log = load_log(map.child("log"), file);
   return settings;

@@ -9,6 +9,7 @@
 
 #include "ear/config.h"
 #include "src/live/mavlink_sensors.h"
+#include "src/live/ros_names.h"
 #include "src/log/log.h"
 
 namespace ear::live {
@@ -30,6 +31,13 @@ struct CameraSettings {
   double delay = 0.0;  ///< [s] from the middle of the exposure to the driver's stamp
 };
 
+/// Topics of ROS 2. Those of the sensors are in the map `topics` (src/ros2/topics.h).
+struct RosSettings {
+  std::optional<int> domain;  ///< nothing: as ROS_DOMAIN_ID says
+  bool publish = true;        ///< odometry and what belongs to it
+  RosNames names;
+};
+
 struct LiveSettings {
   std::filesystem::path file;                  ///< this configuration's
   std::filesystem::path calibration;           ///< folder with <sensor>/sensor.yaml; empty: not given
@@ -39,6 +47,7 @@ struct LiveSettings {
   std::size_t frame_slots = 8;                 ///< frames that wait for the estimator, at most
   std::vector<MavlinkSettings> mavlink;
   std::optional<CameraSettings> cameras;
+  std::optional<RosSettings> ros;
   LogOptions log;
 };
 

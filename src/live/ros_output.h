@@ -2,25 +2,14 @@
 #pragma once
 
 #include <Eigen/Geometry>
-#include <optional>
 #include <string>
-#include <vector>
+#include <utility>
 
 #include "src/live/live_estimator.h"
+#include "src/live/ros_names.h"
 #include "src/ros2/messages.h"
 
 namespace ear::live {
-
-/// What the topics and frames are called.
-struct RosNames {
-  std::string odometry = "/ear/odometry";    ///< after each frame
-  std::string predicted = "/ear/predicted";  ///< at the inertial samples' rate; empty: not published
-  std::string path = "/ear/path";            ///< empty: not published
-  std::string diagnostics = "/diagnostics";
-  std::string odom_frame = "odom";  ///< the estimator's world: z up, origin and heading of the IMU's first pose
-  std::string base_frame = "base_link";
-  bool tf = true;  ///< odom_frame to base_frame, on /tf
-};
 
 /// Messages of estimates. The pose is that of base_frame, which sits in the body as T_B_base says.
 class RosMessages {
