@@ -117,7 +117,7 @@ class Player::Feed {
   Sensor imu_, encoder_, laser_, camera_;
 };
 
-Player::Player(const std::filesystem::path& folder, const RecordingOptions& options) : recording_(folder, options) {}
+Player::Player(Recording recording) : recording_(std::move(recording)) {}
 
 Player::~Player() { stop(); }
 

@@ -2,10 +2,8 @@
 #pragma once
 
 #include <atomic>
-#include <filesystem>
 #include <memory>
 #include <thread>
-#include <vector>
 
 #include "src/live/intake.h"
 #include "src/recording/recording.h"
@@ -14,8 +12,7 @@ namespace ear::live {
 
 class Player {
  public:
-  /// `folder`: of a recording (src/recording/recording.h). Throws InputError.
-  explicit Player(const std::filesystem::path& folder, const RecordingOptions& options = {});
+  explicit Player(Recording recording);
   ~Player();  ///< as stop()
   Player(const Player&) = delete;
   Player& operator=(const Player&) = delete;

@@ -12,8 +12,8 @@ namespace ear::rosbag2 {
 
 using ros2::Bytes;
 
-/// What `compression` ("", "zstd", "lz4") packed. Memory grows with what comes out, up to `most` bytes. Throws InputError
-/// for an unknown name, for bytes that are not so compressed, and for more than `most`.
+/// What `compression` ("", "zstd", "lz4") packed. Memory grows with what comes out, up to `most` bytes. Throws
+/// InputError for an unknown name, for bytes that are not so compressed, and for more than `most`.
 [[nodiscard]] std::vector<std::uint8_t> decompressed(Bytes bytes, const std::string& compression, std::size_t most);
 
 [[nodiscard]] std::vector<std::uint8_t> compressed_zstd(Bytes bytes, int level);

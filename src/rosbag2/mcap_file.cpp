@@ -114,7 +114,8 @@ class SectionWalk {
     const std::uint64_t at = std::exchange(at_, end);  // in case of an error
     const RecordHead head = read_head(file_, at, end);
     at_ = head.end();
-    if (head.opcode != Opcode::message || head.length < kMessageHead || head.length > kLargestPiece) return std::nullopt;
+    if (head.opcode != Opcode::message || head.length < kMessageHead || head.length > kLargestPiece)
+      return std::nullopt;
     const std::vector<std::uint8_t> id = file_.read(head.content, sizeof(std::uint16_t));
     if (channels_.count(RecordReader({id.data(), id.size()}).number<std::uint16_t>()) == 0) return std::nullopt;
     auto content = std::make_shared<const std::vector<std::uint8_t>>(file_.read(head.content, head.length));

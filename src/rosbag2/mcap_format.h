@@ -1,5 +1,5 @@
-// The records of MCAP files, as its specification lays them out (https://mcap.dev/spec): numbers little endian, texts and
-// bytes behind their length.
+// The records of MCAP files, as its specification lays them out (https://mcap.dev/spec): numbers little endian, texts
+// and bytes behind their length.
 #pragma once
 
 #include <array>
@@ -37,7 +37,7 @@ enum class Opcode : std::uint8_t {
   data_end = 0x0F
 };
 
-inline constexpr std::size_t kRecordHead = 9;   // opcode and length
+inline constexpr std::size_t kRecordHead = 9;    // opcode and length
 inline constexpr std::size_t kMessageHead = 22;  // channel, sequence, two times
 inline constexpr std::size_t kFooterSize = 20;
 

@@ -253,7 +253,8 @@ std::vector<std::uint8_t> unpack_chunk(const FileBytes& file, const Section& sec
     const Bytes packed = reader.take(reader.number<std::uint64_t>());
     if (size > kLargestPiece) throw damaged("says it unpacks to " + std::to_string(size) + " bytes");
     std::vector<std::uint8_t> records = decompressed(packed, compression, static_cast<std::size_t>(size) + 1);
-    if (records.size() != size) throw damaged("unpacks to " + std::to_string(records.size()) + " bytes, says " + std::to_string(size));
+    if (records.size() != size)
+      throw damaged("unpacks to " + std::to_string(records.size()) + " bytes, says " + std::to_string(size));
     if (crc != 0 && crc != crc32_of({records.data(), records.size()})) throw damaged("has another checksum");
     for_each_record({records.data(), records.size()}, [](Opcode /*opcode*/, Bytes /*content*/) {});
     return records;

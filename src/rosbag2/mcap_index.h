@@ -57,7 +57,7 @@ struct Section {
 
 struct McapIndex {
   std::map<std::uint16_t, BagTopic> channels;
-  std::vector<Section> sections;                                                ///< in the order of time
+  std::vector<Section> sections;                                               ///< in the order of time
   std::map<std::string, std::pair<std::uint64_t, std::uint64_t>> attachments;  ///< content's place by name
 };
 

@@ -197,8 +197,9 @@ void McapWriter::put(const RecordWriter& records) {
       const std::string reason = strerror(errno);
       const bool cut = ::ftruncate(descriptor_, static_cast<off_t>(offset_)) == 0;
       ::close(std::exchange(descriptor_, -1));
-      throw InputError(located(file_, 0, "", "cannot be written: " + reason + "; it holds what was written up to byte " +
-                                                 std::to_string(offset_) + (cut ? "" : ", and a torn rest")));
+      throw InputError(located(file_, 0, "",
+                               "cannot be written: " + reason + "; it holds what was written up to byte " +
+                                   std::to_string(offset_) + (cut ? "" : ", and a torn rest")));
     }
     rest.data += written;
     rest.size -= static_cast<std::size_t>(written);

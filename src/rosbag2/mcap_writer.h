@@ -54,7 +54,7 @@ class McapWriter {
 
  private:
   struct ChannelState {
-    RecordWriter records;   ///< its schema and channel
+    RecordWriter records;    ///< its schema and channel
     bool described = false;  ///< they are in the file
     std::uint32_t messages = 0;
     std::vector<std::pair<std::uint64_t, std::uint64_t>> index;  ///< time and offset of those in the current chunk

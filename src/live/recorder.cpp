@@ -1,0 +1,146 @@
+#include "src/live/recorder.h"
+
+#include <stdlib.h>
+
+#include <algorithm>
+#include <memory>
+#include <opencv2/core/mat.hpp>
+#include <optional>
+#include <system_error>
+#include <utility>
+
+#include "src/recording/folder_writer.h"
+#include "src/ros2/topics.h"
+#include "src/rosbag2/recording_writer.h"
+
+namespace ear::live {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kMostBytes = std::size_t{32} << 20U;  // that wait for the disk
+
+/// The sensors' files, for as long as it lives.
+class SensorFiles {
+ public:
+  explicit SensorFiles(const Calibration& calibration) {
+    std::string name = (fs::temp_directory_path() / "ear-live-XXXXXX").string();
+    if (::mkdtemp(name.data()) == nullptr) throw InputError(located(name, 0, "", "cannot be created"));
+    folder_ = name;
+    write_sensor_files(calibration, folder_);
+  }
+  ~SensorFiles() {
+    std::error_code ignored;  // a temporary folder that stays is no reason to fail
+    fs::remove_all(folder_, ignored);
+  }
+  SensorFiles(const SensorFiles&) = delete;
+  SensorFiles& operator=(const SensorFiles&) = delete;
+  SensorFiles(SensorFiles&&) = delete;
+  SensorFiles& operator=(SensorFiles&&) = delete;
+
+  [[nodiscard]] const fs::path& folder() const { return folder_; }
+
+ private:
+  fs::path folder_;
+};
+
+rosbag2::RecordingWriter make_writer(const fs::path& file, const Calibration& calibration) {
+  const SensorFiles files(calibration);
+  return {file, ros2::default_topics(), calibration, files.folder()};
+}
+
+/// Without gaps between rows.
+ImageView copy(const ImageView& from, cv::Mat& to) {
+  if (from.empty()) return {};
+  to.create(from.height, from.width, CV_8UC1);
+  for (int row = 0; row < from.height; ++row) {
+    std::copy_n(from.data + row * from.stride, from.width, to.ptr(row));
+  }
+  return {to.data, from.width, from.height, from.width};
+}
+
+}  // namespace
+
+Recorder::Recorder(fs::path file, const Calibration& calibration)
+    : file_(std::move(file)), calibration_(calibration) {
+  if (fs::exists(file_)) throw InputError(located(file_, 0, "", "is there already"));
+  thread_ = std::thread([this] { run(); });
+}
+
+Recorder::~Recorder() { close(); }
+
+void Recorder::close() {
+  {
+    const std::lock_guard lock(mutex_);
+    end_ = true;
+  }
+  changed_.notify_one();
+  if (thread_.joinable()) thread_.join();
+}
+
+void Recorder::add(const QueuedOdometry::Ranges& ranges, std::size_t beams) {
+  const auto end = ranges.range.begin() + static_cast<std::ptrdiff_t>(std::min(beams, ranges.range.size()));
+  push({LaserSample{ranges.t_ns, {ranges.range.begin(), end}}, sizeof(ranges)});
+}
+
+void Recorder::add(const StereoFrame& frame) {
+  auto pixels = std::make_shared<std::array<cv::Mat, 2>>();
+  RecordedFrame copied;
+  copied.t_ns = copied.arrival_ns = frame.t_ns;
+  copied.left = copy(frame.left, (*pixels)[0]);
+  copied.right = copy(frame.right, (*pixels)[1]);
+  copied.pixels = pixels;
+  const std::size_t bytes = (*pixels)[0].total() + (*pixels)[1].total();
+  push({std::move(copied), bytes});
+}
+
+void Recorder::add(const std::string& topic, const std::string& type, TimeNs t_ns, std::vector<std::uint8_t> cdr) {
+  const std::size_t bytes = cdr.size();
+  push({Message{topic, type, t_ns, std::move(cdr)}, bytes});
+}
+
+void Recorder::push(Item item) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (bytes_ + item.bytes > kMostBytes || end_ || !failure_.empty()) {
+      ++left_out_;
+      return;
+    }
+    bytes_ += item.bytes;
+    items_.push_back(std::move(item));
+  }
+  changed_.notify_one();
+}
+
+void Recorder::run() {
+  try {
+    rosbag2::RecordingWriter writer = make_writer(file_, calibration_);
+    while (true) {
+      std::deque<Item> items;
+      {
+        std::unique_lock lock(mutex_);
+        changed_.wait(lock, [this] { return !items_.empty() || end_; });
+        if (items_.empty()) break;
+        items.swap(items_);
+      }
+      for (const Item& item : items) {
+        std::visit(Overloaded{[&](const Message& m) { writer.write_message(m.topic, m.type, m.t_ns, m.cdr); },
+                              [&](const auto& sample) { writer.write(sample); }},
+                   item.what);
+        const std::lock_guard lock(mutex_);
+        bytes_ -= item.bytes;
+      }
+    }
+    writer.close();
+  } catch (const std::exception& error) {  // the estimate goes on
+    const std::lock_guard lock(mutex_);
+    failure_ = error.what();
+  }
+}
+
+std::string Recorder::failure() {
+  const std::lock_guard lock(mutex_);
+  return failure_;
+}
+
+}  // namespace ear::live
