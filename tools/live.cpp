@@ -15,10 +15,16 @@
 #include "src/health_text.h"
 #include "src/live/live_settings.h"
 #include "src/live/notify.h"
+#ifdef EAR_WITH_ROSBAG2
+#include "src/live/recorder.h"
+#endif
 #include "src/log/log.h"
+#include "src/recording/input_error.h"
 #include "src/recording/writers.h"
 #include "tools/commands.h"
+#include "tools/live_ros.h"
 #include "tools/live_sources.h"
+#include "tools/opened_recording.h"
 
 namespace ear::tools {
 namespace {
@@ -27,11 +33,13 @@ struct LiveArguments {
   std::filesystem::path config;
   std::filesystem::path sensors;
   std::filesystem::path out;
+  std::filesystem::path record;
   double duration = 0.0;
 };
 
 constexpr long kLookNs = 200'000'000;      // between two looks at streams and signals
 constexpr double kStatusInterval = 1.0;    // [s] between words to systemd
+constexpr double kQueueSeconds = 2.0;
 constexpr double kStuck = 5.0;             // [s] of an estimator that takes no samples while they come
 
 /// SIGINT and SIGTERM are taken from a queue, by the main thread; all threads that begin later inherit that.
@@ -122,45 +130,175 @@ std::string overflow_text(const Overflows& lost) {
          std::to_string(lost.laser) + " ranges, " + std::to_string(lost.frames) + " frames refused by full queues";
 }
 
-/// Looks at all that runs, and tells people and systemd, until there is a reason to stop, which it returns.
-class Supervisor {
+/// The file of --record: nothing where it is not asked for.
+class Record {
  public:
-  Supervisor(live::Intake& intake, MavlinkLines& lines, const Report& report, live::Notifier& notifier)
-      : intake_(intake), lines_(lines), report_(report), notifier_(notifier), begin_ns_(intake.clock().now()) {}
+  Record(const std::filesystem::path& file, const Calibration& calibration) : beams_(beam_count(calibration)) {
+    if (file.empty()) return;
+#ifdef EAR_WITH_ROSBAG2
+    recorder_ = std::make_unique<live::Recorder>(file, calibration);
+#else
+    throw InputError("--record: MCAP files are not built in: install libfastcdr-dev, libzstd-dev, liblz4-dev, "
+                     "libsqlite3-dev and zlib1g-dev, and build again");
+#endif
+  }
 
-  std::string run(const StopSignals& signals, const live::Player* player, double duration) {
-    notifier_.ready();
-    log_info("ready");
-    while (true) {
-      if (const auto signal = signals.wait()) return *signal;
-      if (player != nullptr && player->done()) return "the recording has ended";
-      const TimeNs now = intake_.clock().now();
-      if (duration > 0.0 && seconds_between(begin_ns_, now) >= duration) return "the time is over";
-      for (const std::string& words : intake_.look()) log_warning(words);
-      for (const std::string& words : lines_.look()) log_warning(words);
-      tell_systemd(now);
-    }
+  void add(const QueuedOdometry::Ranges& ranges) {
+#ifdef EAR_WITH_ROSBAG2
+    if (recorder_) recorder_->add(ranges, beams_);
+#endif
+    static_cast<void>(ranges);
+  }
+  template <typename... What>
+  void add(const What&... what) {
+#ifdef EAR_WITH_ROSBAG2
+    if (recorder_) recorder_->add(what...);
+#else
+    static_cast<void>(sizeof...(what));
+#endif
+  }
+
+  /// What went wrong, once.
+  [[nodiscard]] std::string look() {
+#ifdef EAR_WITH_ROSBAG2
+    if (!recorder_ || said_) return "";
+    std::string text = recorder_->failure();
+    if (text.empty() && recorder_->left_out() > 0) text = "--record: the disk is too slow: messages are left out";
+    said_ = !text.empty();
+    return text;
+#else
+    return "";
+#endif
   }
 
  private:
-  /// The watchdog is fed while the estimator takes samples, or there are none.
-  void tell_systemd(TimeNs now) {
-    const std::uint64_t samples = report_.samples();
-    if (samples != samples_ || intake_.rates().find("imu silent") == 0) alive_ns_ = now;
-    samples_ = samples;
-    if (notifier_.watchdog() && seconds_between(alive_ns_, now) < kStuck) notifier_.alive();
-    if (seconds_between(told_ns_, now) < kStatusInterval) return;
-    told_ns_ = now;
-    notifier_.status(report_.text() + "; " + intake_.rates());
-    log(LogLevel::debug, report_.text() + "; " + intake_.rates());
+  static std::size_t beam_count(const Calibration& calibration) {
+    return calibration.lasers ? calibration.lasers->beams.size() : 0;
   }
 
-  live::Intake& intake_;
-  MavlinkLines& lines_;
-  const Report& report_;
-  live::Notifier& notifier_;
-  TimeNs begin_ns_;
-  TimeNs alive_ns_ = begin_ns_;
+#ifdef EAR_WITH_ROSBAG2
+  std::unique_ptr<live::Recorder> recorder_;
+  bool said_ = false;
+#endif
+  std::size_t beams_;
+};
+
+/// All that runs, from the first sample to the last estimate.
+class Session {
+ public:
+  Session(const LiveArguments& args, const live::LiveSettings& settings, const Calibration& calibration, LiveRos* ros,
+          live::Player* player)
+      : ros_(ros),
+        player_(player),
+        files_(args.out),
+        record_(args.record, calibration),
+        estimator_(config_of(settings, calibration), calibration, {kQueueSeconds, settings.frame_slots}, listeners()),
+        intake_(estimator_, calibration, clock_, taps()),
+        lines_(std::make_unique<MavlinkLines>(settings.mavlink, intake_)) {
+    if (ros_ != nullptr) {
+      ros_->publish(calibration, [this](const auto& topic, const auto& type, TimeNs t_ns, const auto& cdr) {
+        record_.add(topic, type, t_ns, cdr);
+      });
+    }
+    outputs_ = lines_.get();  // from now on estimates go out
+    if (ros_ != nullptr && player_ == nullptr) ros_->start(intake_);
+    if (player_ != nullptr) player_->start(intake_);
+  }
+
+  /// Until there is a reason to stop, which it returns.
+  std::string run(const StopSignals& signals, live::Notifier& notifier, double duration) {
+    const TimeNs begin = clock_.now();
+    notifier.ready();
+    log_info("ready");
+    while (true) {
+      if (const auto signal = signals.wait()) return *signal;
+      if (player_ != nullptr && player_->done()) return "the recording has ended";
+      const TimeNs now = clock_.now();
+      if (duration > 0.0 && seconds_between(begin, now) >= duration) return "the time is over";
+      say();
+      tell(notifier, now);
+    }
+  }
+
+  void stop() {
+    if (player_ != nullptr) player_->stop();
+    if (ros_ != nullptr) ros_->stop();
+    estimator_.stop();
+    say();
+    log_info(report_.summary() + "; " + overflow_text(estimator_.overflows()) + "; " +
+             std::to_string(estimator_.impatient()) + " frames did not wait for late readings");
+  }
+
+ private:
+  static Config config_of(const live::LiveSettings& settings, const Calibration& calibration) {
+    Config config = settings.estimator;
+    config.performance.budget_ms = settings.budget_ms.value_or(live::default_budget_ms(calibration));
+    return config;
+  }
+
+  live::LiveListeners listeners() {
+    return {[this](const live::LiveFrame& frame, const Odometry& odometry) {
+              report_.take(frame, odometry);
+              files_.take(frame);
+              send(frame);
+            },
+            [this](const live::LiveSample& sample) {
+              report_.take(sample);
+              send(sample);
+            }};
+  }
+
+  template <typename What>
+  void send(const What& what) {
+    if (MavlinkLines* const lines = outputs_) {
+      lines->take(what);
+      if (ros_ != nullptr) ros_->take(what);
+    }
+  }
+
+  live::IntakeTaps taps() {
+    return {[this](const ImuSample& sample, const std::optional<NavState>& state) {
+              record_.add(sample);
+              if (ros_ != nullptr) ros_->take(sample, state);
+            },
+            [this](const EncoderSample& sample) { record_.add(sample); },
+            [this](const QueuedOdometry::Ranges& ranges) { record_.add(ranges); },
+            [this](const StereoFrame& frame) { record_.add(frame); }};
+  }
+
+  void say() {
+    for (const std::string& words : intake_.look()) log_warning(words);
+    for (const std::string& words : lines_->look()) log_warning(words);
+    if (const std::string words = record_.look(); !words.empty()) log_error(words);
+    if (ros_ == nullptr) return;
+    for (const std::string& words : ros_->look()) log_warning(words);
+  }
+
+  /// The watchdog is fed while the estimator takes samples, or there are none.
+  void tell(live::Notifier& notifier, TimeNs now) {
+    const std::uint64_t samples = report_.samples();
+    const std::string rates = intake_.rates();
+    if (samples != samples_ || rates.rfind("imu silent", 0) == 0) alive_ns_ = now;
+    samples_ = samples;
+    if (notifier.watchdog() && seconds_between(alive_ns_, now) < kStuck) notifier.alive();
+    if (seconds_between(told_ns_, now) < kStatusInterval) return;
+    told_ns_ = now;
+    notifier.status(report_.text() + "; " + rates);
+    if (ros_ != nullptr) ros_->tell(now, rates);
+    log(LogLevel::debug, report_.text() + "; " + rates);
+  }
+
+  LiveRos* ros_;
+  live::Player* player_;
+  live::LiveClock clock_;
+  Report report_;
+  Files files_;
+  Record record_;
+  std::atomic<MavlinkLines*> outputs_{nullptr};  ///< null until all is there
+  live::LiveEstimator estimator_;
+  live::Intake intake_;
+  std::unique_ptr<MavlinkLines> lines_;
+  TimeNs alive_ns_ = clock_.now();
   TimeNs told_ns_ = 0;
   std::uint64_t samples_ = 0;
 };
@@ -178,45 +316,28 @@ void run_live(const LiveArguments& args) {
   cv::setNumThreads(1);
   const live::LiveSettings settings = settings_of(args);
   set_up_log(settings.log);
-  std::unique_ptr<live::Player> player;
-  if (!args.sensors.empty()) player = std::make_unique<live::Player>(args.sensors);
-  const Calibration calibration = live_calibration(settings, player.get());
-  Config config = settings.estimator;
-  config.performance.budget_ms = settings.budget_ms.value_or(live::default_budget_ms(calibration));
-
-  const live::LiveClock clock;
   live::Notifier notifier;
-  Report report;
-  Files files(args.out);
-  MavlinkLines* lines = nullptr;  // begins after the estimator, which it feeds
-  std::mutex lines_mutex;
-  live::LiveListeners listeners;
-  listeners.on_frame = [&](const live::LiveFrame& frame, const Odometry& odometry) {
-    report.take(frame, odometry);
-    files.take(frame);
-    const std::lock_guard lock(lines_mutex);
-    if (lines != nullptr) lines->take(frame);
-  };
-  listeners.on_imu = [&](const live::LiveSample& sample) {
-    report.take(sample);
-    const std::lock_guard lock(lines_mutex);
-    if (lines != nullptr) lines->take(sample);
-  };
-  live::LiveEstimator estimator(config, calibration, {2.0, settings.frame_slots}, listeners);
-  live::Intake intake(estimator, calibration, clock, {});
-  MavlinkLines mavlink(settings.mavlink, intake);
-  {
-    const std::lock_guard lock(lines_mutex);
-    lines = &mavlink;
+  std::optional<OpenedRecording> opened;
+  std::unique_ptr<live::Player> player;
+  if (!args.sensors.empty()) {
+    opened.emplace(args.sensors, args.config);
+    player = std::make_unique<live::Player>(opened->read({}));
   }
-  if (player) player->start(intake);
-  const std::string reason = Supervisor(intake, mavlink, report, notifier).run(signals, player.get(), args.duration);
+  std::unique_ptr<LiveRos> ros;
+  if (settings.ros) ros = std::make_unique<LiveRos>(settings);
+
+  std::optional<Calibration> calibration = live_calibration(settings, player.get());
+  if (ros && !player) {
+    std::optional<std::string> signal;
+    calibration = ros->complete(*calibration, [&] { return (signal = signals.wait()).has_value(); });
+    if (!calibration) return log_info("stops: " + *signal);
+  }
+  require_usable(*calibration, settings);
+  Session session(args, settings, *calibration, ros.get(), player.get());
+  const std::string reason = session.run(signals, notifier, args.duration);
   notifier.stopping();
   log_info("stops: " + reason);
-  if (player) player->stop();
-  estimator.stop();
-  log_info(report.summary() + "; " + overflow_text(estimator.overflows()) + "; " +
-           std::to_string(estimator.impatient()) + " frames did not wait for late readings");
+  session.stop();
 }
 
 }  // namespace
@@ -230,7 +351,9 @@ void add_live_command(CLI::App& app) {
                       "A recording in place of the sensors, played in real time; its calibration, unless --config has one")
       ->check(CLI::ExistingPath);
   command->add_option("--out", args->out, "Also write estimate.tum and states.csv to this folder, as ear run does");
+  command->add_option("--record", args->record, "Write what comes in and what goes out to this MCAP file");
   command->add_option("--duration", args->duration, "Stop after so many seconds")->check(CLI::PositiveNumber);
+  if (const std::string missing = missing_ros_parts(); !missing.empty()) command->footer("Not in this program: " + missing);
   command->callback([args] { run_live(*args); });
 }
 

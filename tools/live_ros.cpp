@@ -52,8 +52,8 @@ class LiveRos::Impl {
     return messages.complete(known);
   }
 
-  void start(live::Intake& intake) {
-    const Calibration& calibration = intake.calibration();
+  void publish(const Calibration& calibration, LiveRos::OnMessage on_message) {
+    if (!settings_.publish) return;
     Eigen::Isometry3d T_B_base = Eigen::Isometry3d::Identity();
     if (calibration.encoder) {
       T_B_base = calibration.encoder->T_BO;
@@ -63,12 +63,14 @@ class LiveRos::Impl {
       log_warning("ros: neither wheels nor tf_static say where " + settings_.names.base_frame +
                   " is: the IMU's frame stands for it");
     }
-    if (settings_.publish) publisher_.emplace(participant_, live::RosMessages(settings_.names, T_B_base));
-    sensors_.emplace(participant_, topics_, intake);
+    publisher_.emplace(participant_, live::RosMessages(settings_.names, T_B_base), std::move(on_message));
   }
 
+  void start(live::Intake& intake) { sensors_.emplace(participant_, topics_, intake); }
+  void stop() { sensors_.reset(); }
+
   template <typename... What>
-  void publish(const What&... what) {
+  void send(const What&... what) {
     if (publisher_) publisher_->take(what...);
   }
   void tell(TimeNs t_ns, const std::string& rates) {
@@ -91,10 +93,14 @@ LiveRos::~LiveRos() = default;
 std::optional<Calibration> LiveRos::complete(const Calibration& known, const std::function<bool()>& stop) {
   return impl_->complete(known, stop);
 }
+void LiveRos::publish(const Calibration& calibration, OnMessage on_message) {
+  impl_->publish(calibration, std::move(on_message));
+}
 void LiveRos::start(live::Intake& intake) { impl_->start(intake); }
-void LiveRos::take(const ImuSample& sample, const std::optional<NavState>& state) { impl_->publish(sample, state); }
-void LiveRos::take(const live::LiveSample& sample) { impl_->publish(sample); }
-void LiveRos::take(const live::LiveFrame& frame) { impl_->publish(frame); }
+void LiveRos::stop() { impl_->stop(); }
+void LiveRos::take(const ImuSample& sample, const std::optional<NavState>& state) { impl_->send(sample, state); }
+void LiveRos::take(const live::LiveSample& sample) { impl_->send(sample); }
+void LiveRos::take(const live::LiveFrame& frame) { impl_->send(frame); }
 std::vector<std::string> LiveRos::look() { return impl_->look(); }
 void LiveRos::tell(TimeNs t_ns, const std::string& rates) { impl_->tell(t_ns, rates); }
 

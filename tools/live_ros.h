@@ -1,6 +1,7 @@
 // ROS 2 in `ear live`: its sensors, its calibration, its outputs; or words about how to get it where it is not built.
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -26,8 +27,13 @@ class LiveRos {
   /// then nothing.
   [[nodiscard]] std::optional<Calibration> complete(const Calibration& known, const std::function<bool()>& stop);
 
-  /// Begins to read, and to write; once.
+  /// What goes out; before start(). `on_message` gets each message too: topic, type, stamp, CDR.
+  using OnMessage = std::function<void(const std::string&, const std::string&, TimeNs, const std::vector<std::uint8_t>&)>;
+  void publish(const Calibration& calibration, OnMessage on_message);
+  /// Begins to read; once.
   void start(live::Intake& intake);
+  /// Reads no more.
+  void stop();
 
   /// By the inertial sensor's thread.
   void take(const ImuSample& sample, const std::optional<NavState>& state);

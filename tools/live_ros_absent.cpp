@@ -13,7 +13,9 @@ LiveRos::~LiveRos() = default;
 std::optional<Calibration> LiveRos::complete(const Calibration& /*known*/, const std::function<bool()>& /*stop*/) {
   return std::nullopt;
 }
+void LiveRos::publish(const Calibration& /*calibration*/, OnMessage /*on_message*/) {}
 void LiveRos::start(live::Intake& /*intake*/) {}
+void LiveRos::stop() {}
 void LiveRos::take(const ImuSample& /*sample*/, const std::optional<NavState>& /*state*/) {}
 void LiveRos::take(const live::LiveSample& /*sample*/) {}
 void LiveRos::take(const live::LiveFrame& /*frame*/) {}

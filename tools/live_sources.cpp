@@ -20,29 +20,28 @@ Eigen::Matrix3d mounting(const live::MavlinkSettings& settings, const Calibratio
   throw InputError("mavlink: mounting_deg: how does the IMU sit in the vehicle? Without wheels nothing else says so");
 }
 
-void require_usable(const Calibration& calibration, const std::filesystem::path& folder) {
-  std::vector<Finding> findings = check_calibration(calibration);
-  if (const auto missing = check_sensors(calibration)) findings.push_back(*missing);
-  for (const Finding& finding : findings) {
-    const std::string where = located(folder, 0, finding.where, finding.message);
-    if (finding.severity == Severity::error) throw InputError(where);
-    log_warning(where);
-  }
-}
-
 }  // namespace
 
 Calibration live_calibration(const live::LiveSettings& settings, const live::Player* player) {
   if (settings.calibration.empty()) {
     if (player != nullptr) return player->calibration();
-    throw InputError(located(settings.file, 0, "calibration", "missing: a folder with <sensor>/sensor.yaml"));
+    if (!settings.ros) throw InputError(located(settings.file, 0, "calibration", "missing: a folder with <sensor>/sensor.yaml"));
+    return settings.kalibr.size() == 2 ? load_kalibr(settings.kalibr[0], settings.kalibr[1]) : Calibration{};
   }
   Warnings warnings;
-  const Calibration calibration =
-      load_calibration(find_mav0(settings.calibration), settings.kalibr, warnings);
+  const Calibration calibration = load_calibration(find_mav0(settings.calibration), settings.kalibr, warnings);
   for (const Warning& warning : warnings.list()) log_warning(warning.kind + ": " + warning.first);
-  require_usable(calibration, settings.calibration);
   return calibration;
+}
+
+void require_usable(const Calibration& calibration, const live::LiveSettings& settings) {
+  std::vector<Finding> findings = check_calibration(calibration);
+  if (const auto missing = check_sensors(calibration)) findings.push_back(*missing);
+  for (const Finding& finding : findings) {
+    const std::string where = located(settings.file, 0, "calibration: " + finding.where, finding.message);
+    if (finding.severity == Severity::error) throw InputError(where);
+    log_warning(where);
+  }
 }
 
 MavlinkLines::MavlinkLines(const std::vector<live::MavlinkSettings>& settings, live::Intake& intake) {

@@ -11,9 +11,12 @@
 
 namespace ear::tools {
 
-/// The calibration that the settings name, or else that of the recording that is played. Throws InputError where there
-/// is none, or it cannot be used.
+/// The calibration that the settings name, or else that of the recording that is played; without either what Kalibr's
+/// files say, and the rest as topics of ROS 2 will. Throws InputError.
 [[nodiscard]] Calibration live_calibration(const live::LiveSettings& settings, const live::Player* player);
+
+/// Throws InputError where no estimate can come of it; logs what is odd.
+void require_usable(const Calibration& calibration, const live::LiveSettings& settings);
 
 /// The lines to flight controllers and microcontrollers. A line's thread runs as long as this lives.
 class MavlinkLines {

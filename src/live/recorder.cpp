@@ -44,9 +44,9 @@ class SensorFiles {
   fs::path folder_;
 };
 
-rosbag2::RecordingWriter make_writer(const fs::path& file, const Calibration& calibration) {
+std::unique_ptr<rosbag2::RecordingWriter> make_writer(const fs::path& file, const Calibration& calibration) {
   const SensorFiles files(calibration);
-  return {file, ros2::default_topics(), calibration, files.folder()};
+  return std::make_unique<rosbag2::RecordingWriter>(file, ros2::default_topics(), calibration, files.folder());
 }
 
 /// Without gaps between rows.
@@ -61,9 +61,9 @@ ImageView copy(const ImageView& from, cv::Mat& to) {
 
 }  // namespace
 
-Recorder::Recorder(fs::path file, const Calibration& calibration)
-    : file_(std::move(file)), calibration_(calibration) {
-  if (fs::exists(file_)) throw InputError(located(file_, 0, "", "is there already"));
+Recorder::Recorder(const fs::path& file, const Calibration& calibration) {
+  if (fs::exists(file)) throw InputError(located(file, 0, "", "is there already"));
+  writer_ = make_writer(file, calibration);
   thread_ = std::thread([this] { run(); });
 }
 
@@ -114,7 +114,6 @@ void Recorder::push(Item item) {
 
 void Recorder::run() {
   try {
-    rosbag2::RecordingWriter writer = make_writer(file_, calibration_);
     while (true) {
       std::deque<Item> items;
       {
@@ -124,14 +123,14 @@ void Recorder::run() {
         items.swap(items_);
       }
       for (const Item& item : items) {
-        std::visit(Overloaded{[&](const Message& m) { writer.write_message(m.topic, m.type, m.t_ns, m.cdr); },
-                              [&](const auto& sample) { writer.write(sample); }},
+        std::visit(Overloaded{[&](const Message& m) { writer_->write_message(m.topic, m.type, m.t_ns, m.cdr); },
+                              [&](const auto& sample) { writer_->write(sample); }},
                    item.what);
         const std::lock_guard lock(mutex_);
         bytes_ -= item.bytes;
       }
     }
-    writer.close();
+    writer_->close();
   } catch (const std::exception& error) {  // the estimate goes on
     const std::lock_guard lock(mutex_);
     failure_ = error.what();

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <deque>
 #include <filesystem>
+#include <memory>
 #include <mutex>
 #include <string>
 #include <thread>
@@ -15,6 +16,10 @@
 #include "src/live/live_estimator.h"
 #include "src/recording/recording.h"
 
+namespace ear::rosbag2 {
+class RecordingWriter;
+}
+
 namespace ear::live {
 
 /// Sensors' threads hand in samples and do not wait for the disk: what it does not take in time is left out, and
@@ -22,7 +27,7 @@ namespace ear::live {
 class Recorder {
  public:
   /// The file must not be there yet. Throws InputError.
-  Recorder(std::filesystem::path file, const Calibration& calibration);
+  Recorder(const std::filesystem::path& file, const Calibration& calibration);
   ~Recorder();  ///< as close()
   Recorder(const Recorder&) = delete;
   Recorder& operator=(const Recorder&) = delete;
@@ -59,8 +64,7 @@ class Recorder {
   void push(Item item);
   void run();
 
-  std::filesystem::path file_;
-  Calibration calibration_;
+  std::unique_ptr<rosbag2::RecordingWriter> writer_;  ///< the thread's
   std::mutex mutex_;  ///< of what follows, up to the counter
   std::condition_variable changed_;
   std::deque<Item> items_;
