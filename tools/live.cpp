@@ -133,10 +133,11 @@ std::string overflow_text(const Overflows& lost) {
 /// The file of --record: nothing where it is not asked for.
 class Record {
  public:
-  Record(const std::filesystem::path& file, const Calibration& calibration) : beams_(beam_count(calibration)) {
+  Record(const std::filesystem::path& file, const Calibration& calibration, const SensorFiles& files)
+      : beams_(beam_count(calibration)) {
     if (file.empty()) return;
 #ifdef EAR_WITH_ROSBAG2
-    recorder_ = std::make_unique<live::Recorder>(file, calibration);
+    recorder_ = std::make_unique<live::Recorder>(file, calibration, files.folder());
 #else
     throw InputError("--record: MCAP files are not built in: install libfastcdr-dev, libzstd-dev, liblz4-dev, "
                      "libsqlite3-dev and zlib1g-dev, and build again");
@@ -186,12 +187,12 @@ class Record {
 /// All that runs, from the first sample to the last estimate.
 class Session {
  public:
-  Session(const LiveArguments& args, const live::LiveSettings& settings, const Calibration& calibration, LiveRos* ros,
-          live::Player* player)
+  Session(const LiveArguments& args, const live::LiveSettings& settings, const Calibration& calibration,
+          const SensorFiles& sensor_files, LiveRos* ros, live::Player* player)
       : ros_(ros),
         player_(player),
         files_(args.out),
-        record_(args.record, calibration),
+        record_(args.record, calibration, sensor_files),
         estimator_(config_of(settings, calibration), calibration, {kQueueSeconds, settings.frame_slots}, listeners()),
         intake_(estimator_, calibration, clock_, taps()),
         lines_(std::make_unique<MavlinkLines>(settings.mavlink, intake_)) {
@@ -311,6 +312,13 @@ live::LiveSettings settings_of(const LiveArguments& args) {
   return settings;
 }
 
+/// Where the whole calibration was read from; empty: it comes from several places.
+std::filesystem::path folder_of(const LiveArguments& args, const live::LiveSettings& settings) {
+  if (!settings.kalibr.empty() || settings.ros) return {};
+  if (!settings.calibration.empty()) return find_mav0(settings.calibration);
+  return std::filesystem::is_directory(args.sensors / "mav0") ? args.sensors / "mav0" : std::filesystem::path();
+}
+
 void run_live(const LiveArguments& args) {
   const StopSignals signals;
   cv::setNumThreads(1);
@@ -333,7 +341,8 @@ void run_live(const LiveArguments& args) {
     if (!calibration) return log_info("stops: " + *signal);
   }
   require_usable(*calibration, settings);
-  Session session(args, settings, *calibration, ros.get(), player.get());
+  const SensorFiles files(*calibration, folder_of(args, settings));
+  Session session(args, settings, files.read(), files, ros.get(), player.get());
   const std::string reason = session.run(signals, notifier, args.duration);
   notifier.stopping();
   log_info("stops: " + reason);

@@ -1,10 +1,15 @@
 #include "tools/live_sources.h"
 
+#include <stdlib.h>
+
 #include <cmath>
+#include <system_error>
+#include <utility>
 
 #include "src/log/log.h"
 #include "src/mavlink/odometry_message.h"
 #include "src/recording/calibration_files.h"
+#include "src/recording/folder_writer.h"
 #include "src/recording/input_error.h"
 
 namespace ear::tools {
@@ -32,6 +37,25 @@ Calibration live_calibration(const live::LiveSettings& settings, const live::Pla
   const Calibration calibration = load_calibration(find_mav0(settings.calibration), settings.kalibr, warnings);
   for (const Warning& warning : warnings.list()) log_warning(warning.kind + ": " + warning.first);
   return calibration;
+}
+
+SensorFiles::SensorFiles(const Calibration& calibration, std::filesystem::path folder) : folder_(std::move(folder)) {
+  if (!folder_.empty()) return;
+  std::string name = (std::filesystem::temp_directory_path() / "ear-live-XXXXXX").string();
+  if (::mkdtemp(name.data()) == nullptr) throw InputError(located(name, 0, "", "cannot be created"));
+  folder_ = name;
+  temporary_ = true;
+  write_sensor_files(calibration, folder_);
+}
+
+SensorFiles::~SensorFiles() {
+  std::error_code ignored;  // a temporary folder that stays is no reason to fail
+  if (temporary_) std::filesystem::remove_all(folder_, ignored);
+}
+
+Calibration SensorFiles::read() const {
+  Warnings ignored;  // they were said of the files before
+  return load_calibration(folder_, {}, ignored);
 }
 
 void require_usable(const Calibration& calibration, const live::LiveSettings& settings) {

@@ -1,6 +1,7 @@
 // What `ear live` reads: opens the sources that its settings name.
 #pragma once
 
+#include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
@@ -14,6 +15,27 @@ namespace ear::tools {
 /// The calibration that the settings name, or else that of the recording that is played; without either what Kalibr's
 /// files say, and the rest as topics of ROS 2 will. Throws InputError.
 [[nodiscard]] Calibration live_calibration(const live::LiveSettings& settings, const live::Player* player);
+
+/// A calibration as files, for as long as it lives; a recording that carries them gives the same to the last bit.
+class SensorFiles {
+ public:
+  /// Writes the sensors' files to a temporary folder, unless `folder` is where `calibration` was read from. Throws
+  /// InputError.
+  SensorFiles(const Calibration& calibration, std::filesystem::path folder);
+  ~SensorFiles();
+  SensorFiles(const SensorFiles&) = delete;
+  SensorFiles& operator=(const SensorFiles&) = delete;
+  SensorFiles(SensorFiles&&) = delete;
+  SensorFiles& operator=(SensorFiles&&) = delete;
+
+  [[nodiscard]] const std::filesystem::path& folder() const { return folder_; }
+  /// As it is read from there.
+  [[nodiscard]] Calibration read() const;
+
+ private:
+  std::filesystem::path folder_;
+  bool temporary_ = false;
+};
 
 /// Throws InputError where no estimate can come of it; logs what is odd.
 void require_usable(const Calibration& calibration, const live::LiveSettings& settings);

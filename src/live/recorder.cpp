@@ -1,15 +1,10 @@
 #include "src/live/recorder.h"
 
-#include <stdlib.h>
-
 #include <algorithm>
 #include <memory>
 #include <opencv2/core/mat.hpp>
-#include <optional>
-#include <system_error>
 #include <utility>
 
-#include "src/recording/folder_writer.h"
 #include "src/ros2/topics.h"
 #include "src/rosbag2/recording_writer.h"
 
@@ -19,35 +14,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kMostBytes = std::size_t{32} << 20U;  // that wait for the disk
-
-/// The sensors' files, for as long as it lives.
-class SensorFiles {
- public:
-  explicit SensorFiles(const Calibration& calibration) {
-    std::string name = (fs::temp_directory_path() / "ear-live-XXXXXX").string();
-    if (::mkdtemp(name.data()) == nullptr) throw InputError(located(name, 0, "", "cannot be created"));
-    folder_ = name;
-    write_sensor_files(calibration, folder_);
-  }
-  ~SensorFiles() {
-    std::error_code ignored;  // a temporary folder that stays is no reason to fail
-    fs::remove_all(folder_, ignored);
-  }
-  SensorFiles(const SensorFiles&) = delete;
-  SensorFiles& operator=(const SensorFiles&) = delete;
-  SensorFiles(SensorFiles&&) = delete;
-  SensorFiles& operator=(SensorFiles&&) = delete;
-
-  [[nodiscard]] const fs::path& folder() const { return folder_; }
-
- private:
-  fs::path folder_;
-};
-
-std::unique_ptr<rosbag2::RecordingWriter> make_writer(const fs::path& file, const Calibration& calibration) {
-  const SensorFiles files(calibration);
-  return std::make_unique<rosbag2::RecordingWriter>(file, ros2::default_topics(), calibration, files.folder());
-}
 
 /// Without gaps between rows.
 ImageView copy(const ImageView& from, cv::Mat& to) {
@@ -61,9 +27,9 @@ ImageView copy(const ImageView& from, cv::Mat& to) {
 
 }  // namespace
 
-Recorder::Recorder(const fs::path& file, const Calibration& calibration) {
+Recorder::Recorder(const fs::path& file, const Calibration& calibration, const fs::path& calibration_folder) {
   if (fs::exists(file)) throw InputError(located(file, 0, "", "is there already"));
-  writer_ = make_writer(file, calibration);
+  writer_ = std::make_unique<rosbag2::RecordingWriter>(file, ros2::default_topics(), calibration, calibration_folder);
   thread_ = std::thread([this] { run(); });
 }
 

@@ -26,8 +26,10 @@ namespace ear::live {
 /// counted. Samples become messages as `ear export --format mcap` writes them, so that `ear run` reads the file.
 class Recorder {
  public:
-  /// The file must not be there yet. Throws InputError.
-  Recorder(const std::filesystem::path& file, const Calibration& calibration);
+  /// The file must not be there yet. `calibration_folder` has the <sensor>/sensor.yaml that `calibration` was read from;
+  /// they go into the file. Throws InputError.
+  Recorder(const std::filesystem::path& file, const Calibration& calibration,
+           const std::filesystem::path& calibration_folder);
   ~Recorder();  ///< as close()
   Recorder(const Recorder&) = delete;
   Recorder& operator=(const Recorder&) = delete;
