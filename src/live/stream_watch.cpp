@@ -68,9 +68,11 @@ void StreamWatch::look_at_rate(TimeNs now_ns, std::vector<std::string>& words) {
   rate_hz_ = static_cast<double>(count - seen_) / interval;
   seen_ = count;
   seen_ns_ = now_ns;
-  if (expected_hz_ <= 0.0 || silent_ || !began) return;
+  if (expected_hz_ <= 0.0 || silent_ || !began || rate_hz_ == 0.0) return;  // silence has words of its own
   const bool high = rate_hz_ > kFlood * expected_hz_ + kFewest;
-  const bool low = rate_hz_ < kSlow * expected_hz_ && expected_hz_ > kFewest;
+  const bool few = rate_hz_ < kSlow * expected_hz_ && expected_hz_ > kFewest;
+  const bool low = few && was_low_;  // twice in a row: else it only began or ended
+  was_low_ = few;
   const Rate rate = high ? Rate::high : low ? Rate::low : Rate::right;
   const bool back = said_ != Rate::right && std::abs(rate_hz_ - expected_hz_) < kNormal * expected_hz_;
   if (rate != Rate::right && rate != said_) {

@@ -46,7 +46,7 @@ class StreamWatch {
   std::uint64_t seen_ = 0, seen_steps_ = 0;
   TimeNs seen_ns_;
   double rate_hz_ = 0.0;
-  bool silent_ = false;
+  bool silent_ = false, was_low_ = false;
   enum class Rate { right, high, low } said_ = Rate::right;
 };
 
