@@ -16,6 +16,7 @@ constexpr double kFinalGain = 0.02;    // of the offset, once it is known
 constexpr double kFinalDrift = 2e-4;
 constexpr double kMostDrift = 5e-4;    // of any crystal
 
+bool is_stamp(TimeNs t_ns) { return t_ns > -kLargestStamp && t_ns < kLargestStamp; }
 TimeNs to_ns(double seconds) { return static_cast<TimeNs>(std::llround(1e9 * seconds)); }
 
 }  // namespace
@@ -28,7 +29,7 @@ void ClockSync::restart() {
 
 void ClockSync::add(TimeNs sent_ns, TimeNs remote_ns, TimeNs now_ns) {
   const double trip = seconds_between(sent_ns, now_ns);
-  if (trip < 0.0 || trip > kLongest || std::abs(remote_ns) > kLargestStamp) return;
+  if (trip < 0.0 || trip > kLongest || !is_stamp(remote_ns)) return;
   round_trip_ = used_ == 0 ? trip : std::min(trip, round_trip_ * kForget);
   if (trip > kUsual * round_trip_ + kUsualMargin) return;
 

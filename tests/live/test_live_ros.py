@@ -21,7 +21,7 @@ os.environ["CYCLONEDDS_URI"] = """<CycloneDDS><Domain><General><Interfaces><Netw
 <AllowMulticast>false</AllowMulticast></General><Discovery><ParticipantIndex>auto</ParticipantIndex>
 <Peers><Peer Address="127.0.0.1"/></Peers></Discovery></Domain></CycloneDDS>"""
 
-SECONDS = 6
+SECONDS = 5
 CONFIG = """calibration: {recording}
 budget_ms: 0
 frame_slots: 64
@@ -69,12 +69,20 @@ class Live:
 
 
 class Ros(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.recordings = tempfile.TemporaryDirectory()
+        cls.recording = Path(cls.recordings.name) / "recording"
+        ear("simulate", "flat1", "--seed", 3, "--duration", SECONDS, "--camera-rate", 20, "--out", cls.recording)
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.recordings.cleanup()
+
     def setUp(self):
         self.temporary = tempfile.TemporaryDirectory()
         self.folder = Path(self.temporary.name)
         self.domain = 100 + os.getpid() % 100
-        self.recording = self.folder / "recording"
-        ear("simulate", "flat1", "--seed", 3, "--duration", SECONDS, "--camera-rate", 20, "--out", self.recording)
         self.config = self.folder / "live.yaml"
         self.config.write_text(CONFIG.format(recording=self.recording, domain=self.domain), encoding="utf-8")
 
@@ -86,8 +94,8 @@ class Ros(unittest.TestCase):
         result = subprocess.run([str(PLAYER), str(self.recording), str(self.domain), quality, str(log), str(seconds)],
                                 capture_output=True, text=True, timeout=120, check=False)
         self.assertEqual(result.returncode, 0, result.stderr)
-        rows = list(csv.reader(log.open(encoding="utf-8")))
-        return int(result.stdout.split()[0]), rows
+        with log.open(encoding="utf-8") as lines:
+            return int(result.stdout.split()[0]), list(csv.reader(lines))
 
     def test_agrees_with_a_run_of_the_recording(self):
         ear("run", self.recording, "--out", self.folder / "run")
@@ -105,7 +113,7 @@ class Ros(unittest.TestCase):
         # A machine that is busy may make frames go on without late readings; then digits may differ, positions do not.
         estimated = self.positions(self.folder / "live" / "estimate.tum")
         expected = self.positions(self.folder / "run" / "estimate.tum")
-        self.assertGreater(len(expected), 80)
+        self.assertGreater(len(expected), 60)
         self.assertEqual(set(estimated), set(expected))
         for stamp, position in expected.items():
             for a, b in zip(estimated[stamp], position):
@@ -126,10 +134,10 @@ class Ros(unittest.TestCase):
         for stamp, x, y, z, _, frame, child in rows:
             self.assertEqual((frame, child), ("odom", "base_link"))
             row = states[stamp]
-            R = self.rotation(*(float(row[key]) for key in ("qw", "qx", "qy", "qz")))
+            R = self.rotation(*(float(row[key]) for key in ("q_w", "q_x", "q_y", "q_z")))
             lever = [sum(R[i][k] * T_BO[4 * k + 3] for k in range(3)) for i in range(3)]
             for i, heard in enumerate((x, y, z)):
-                self.assertAlmostEqual(float(heard), float(row[("px", "py", "pz")[i]]) + lever[i], delta=1e-6)
+                self.assertAlmostEqual(float(heard), float(row[("p_x", "p_y", "p_z")[i]]) + lever[i], delta=1e-6)
 
     def test_publisher_that_leaves_and_comes_back_as_another(self):
         live = Live(self.folder, self.config)
@@ -150,9 +158,8 @@ class Ros(unittest.TestCase):
 
     @staticmethod
     def states(file):
-        lines = file.read_text(encoding="utf-8").splitlines()
-        names = [name.strip().lstrip("#").strip().split(" ")[0] for name in lines[0].split(",")]
-        return [dict(zip(names, line.split(","))) for line in lines[1:]]
+        with file.open(encoding="utf-8") as lines:
+            return list(csv.DictReader(lines))
 
     @staticmethod
     def matrix(file):
