@@ -203,7 +203,11 @@ class Session {
     }
     outputs_ = lines_.get();  // from now on estimates go out
     if (ros_ != nullptr && player_ == nullptr) ros_->start(intake_);
-    if (player_ != nullptr) player_->start(intake_);
+    if (player_ != nullptr) {
+      player_->start(intake_);
+    } else {
+      cameras_ = open_cameras(settings, intake_);
+    }
   }
 
   /// Until there is a reason to stop, which it returns.
@@ -224,6 +228,7 @@ class Session {
   void stop() {
     if (player_ != nullptr) player_->stop();
     if (ros_ != nullptr) ros_->stop();
+    cameras_.reset();
     estimator_.stop();
     say();
     log_info(report_.summary() + "; " + overflow_text(estimator_.overflows()) + "; " +
@@ -270,6 +275,9 @@ class Session {
   void say() {
     for (const std::string& words : intake_.look()) log_warning(words);
     for (const std::string& words : lines_->look()) log_warning(words);
+    if (cameras_) {
+      for (const std::string& words : cameras_->look()) log_warning(words);
+    }
     if (const std::string words = record_.look(); !words.empty()) log_error(words);
     if (ros_ == nullptr) return;
     for (const std::string& words : ros_->look()) log_warning(words);
@@ -299,6 +307,7 @@ class Session {
   live::LiveEstimator estimator_;
   live::Intake intake_;
   std::unique_ptr<MavlinkLines> lines_;
+  std::unique_ptr<live::StereoCamera> cameras_;
   TimeNs alive_ns_ = clock_.now();
   TimeNs told_ns_ = 0;
   std::uint64_t samples_ = 0;

@@ -68,6 +68,22 @@ void require_usable(const Calibration& calibration, const live::LiveSettings& se
   }
 }
 
+std::unique_ptr<live::StereoCamera> open_cameras(const live::LiveSettings& settings, live::Intake& intake) {
+  if (!settings.cameras) return nullptr;
+  const live::CameraSettings& wanted = *settings.cameras;
+  const std::vector<CameraCalibration>& cameras = intake.calibration().cameras;
+  if (cameras.empty()) throw InputError(located(settings.file, 0, "cameras", "the calibration has none"));
+  if (!wanted.right.empty() && cameras.size() < 2) {
+    throw InputError(located(settings.file, 0, "cameras.right", "the calibration has one camera"));
+  }
+  const bool side_by_side = wanted.right.empty() && cameras.size() > 1;
+  const int width = (side_by_side ? 2 : 1) * cameras[0].width;
+  auto left = live::open_v4l2(wanted.device, width, cameras[0].height, wanted.rate_hz);
+  std::unique_ptr<live::VideoDevice> right;
+  if (!wanted.right.empty()) right = live::open_v4l2(wanted.right, cameras[1].width, cameras[1].height, wanted.rate_hz);
+  return std::make_unique<live::StereoCamera>(std::move(left), std::move(right), wanted.delay, intake);
+}
+
 MavlinkLines::MavlinkLines(const std::vector<live::MavlinkSettings>& settings, live::Intake& intake) {
   for (const live::MavlinkSettings& one : settings) {
     Line line;

@@ -9,6 +9,7 @@
 #include "src/live/live_settings.h"
 #include "src/live/mavlink_output.h"
 #include "src/live/player.h"
+#include "src/live/stereo_camera.h"
 
 namespace ear::tools {
 
@@ -39,6 +40,9 @@ class SensorFiles {
 
 /// Throws InputError where no estimate can come of it; logs what is odd.
 void require_usable(const Calibration& calibration, const live::LiveSettings& settings);
+
+/// Opens the video devices; null where the settings name none. Throws std::runtime_error.
+[[nodiscard]] std::unique_ptr<live::StereoCamera> open_cameras(const live::LiveSettings& settings, live::Intake& intake);
 
 /// The lines to flight controllers and microcontrollers. A line's thread runs as long as this lives.
 class MavlinkLines {
