@@ -21,7 +21,7 @@ void read_again(Bytes bytes) {
   const std::vector<std::uint8_t> once = encode(decode<Message>(bytes));
   const std::vector<std::uint8_t> twice = encode(decode<Message>({once.data(), once.size()}));
   fuzz::require(once == twice, "what is written is read");
-  fuzz::require(once.size() < 16 * bytes.size() + 64, "a message does not grow");
+  fuzz::require(once.size() < 16 * bytes.size + 64, "a message does not grow");
 }
 
 void convert(const char* topic, const char* type, Bytes bytes) {
