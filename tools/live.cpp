@@ -195,7 +195,7 @@ class Session {
         record_(args.record, calibration, sensor_files),
         estimator_(config_of(settings, calibration), calibration, {kQueueSeconds, settings.frame_slots}, listeners()),
         intake_(estimator_, calibration, clock_, taps()),
-        lines_(std::make_unique<MavlinkLines>(settings.mavlink, intake_)) {
+        lines_(std::make_unique<MavlinkLines>(lines_of(settings, player != nullptr), intake_)) {
     if (ros_ != nullptr) {
       ros_->publish(calibration, [this](const auto& topic, const auto& type, TimeNs t_ns, const auto& cdr) {
         record_.add(topic, type, t_ns, cdr);
@@ -236,6 +236,15 @@ class Session {
   }
 
  private:
+  /// A recording stands for all sensors.
+  static std::vector<live::MavlinkSettings> lines_of(const live::LiveSettings& settings, bool plays) {
+    std::vector<live::MavlinkSettings> lines = settings.mavlink;
+    for (live::MavlinkSettings& line : lines) {
+      if (plays) line.inputs = {};
+    }
+    return lines;
+  }
+
   static Config config_of(const live::LiveSettings& settings, const Calibration& calibration) {
     Config config = settings.estimator;
     config.performance.budget_ms = settings.budget_ms.value_or(live::default_budget_ms(calibration));

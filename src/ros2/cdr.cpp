@@ -95,11 +95,16 @@ class Reader {
 
   template <typename T>
   void operator()(const char* name, T& value) {
-    field_ = name;
+    path_.push_back(name);
     get(value);
+    path_.pop_back();
   }
-  /// The field that was read last.
-  [[nodiscard]] const char* field() const { return field_; }
+  /// The field that is being read, "header.stamp.sec".
+  [[nodiscard]] std::string field() const {
+    std::string joined;
+    for (const char* name : path_) joined += (joined.empty() ? "" : ".") + std::string(name);
+    return joined.empty() ? "header" : joined;
+  }
 
  private:
   template <typename T>
@@ -133,7 +138,7 @@ class Reader {
 
   cdr::Cdr& cdr_;
   std::size_t size_;
-  const char* field_ = "header";
+  std::vector<const char*> path_;
 };
 
 CdrError wrong(const char* type, const std::string& field, const std::string& what) {

@@ -1,6 +1,8 @@
 #include "src/rosbag2/recording_writer.h"
 
+#include <algorithm>
 #include <fstream>
+#include <limits>
 #include <map>
 #include <optional>
 #include <sstream>
@@ -60,9 +62,10 @@ class RecordingWriter::Impl {
 
   void write(const RecordedFrame& frame) {
     const std::map<std::string, std::string> by_arrival{{"log_time", "arrival"}};
-    put(topics_.left, frame.arrival_ns, frame.t_ns, ros2::image_message(frame.left, 0, frame.t_ns), by_arrival);
+    last_arrival_ns_ = std::max(last_arrival_ns_, frame.arrival_ns);  // frames stay in order
+    put(topics_.left, last_arrival_ns_, frame.t_ns, ros2::image_message(frame.left, 0, frame.t_ns), by_arrival);
     if (frame.right.empty()) return;
-    put(topics_.right, frame.arrival_ns, frame.t_ns, ros2::image_message(frame.right, 1, frame.t_ns), by_arrival);
+    put(topics_.right, last_arrival_ns_, frame.t_ns, ros2::image_message(frame.right, 1, frame.t_ns), by_arrival);
   }
 
   /// What says where the sensors are, with the first message's time.
@@ -96,6 +99,7 @@ class RecordingWriter::Impl {
   Calibration calibration_;
   McapWriter file_;
   std::map<std::string, McapWriter::Channel> channels_;
+  TimeNs last_arrival_ns_ = std::numeric_limits<TimeNs>::min();
   bool described_ = false;
 };
 
