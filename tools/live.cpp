@@ -3,6 +3,7 @@
 
 #include <signal.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cstdio>
@@ -15,6 +16,7 @@
 #include "src/health_text.h"
 #include "src/live/live_settings.h"
 #include "src/live/notify.h"
+#include "src/live/preflight.h"
 #ifdef EAR_WITH_ROSBAG2
 #include "src/live/recorder.h"
 #endif
@@ -35,6 +37,7 @@ struct LiveArguments {
   std::filesystem::path out;
   std::filesystem::path record;
   double duration = 0.0;
+  bool check = false;
 };
 
 constexpr long kLookNs = 200'000'000;      // between two looks at streams and signals
@@ -193,7 +196,8 @@ class Session {
         player_(player),
         files_(args.out),
         record_(args.record, calibration, sensor_files),
-        estimator_(config_of(settings, calibration), calibration, {kQueueSeconds, settings.frame_slots}, listeners()),
+        preflight_(args.check ? std::make_unique<live::Preflight>(calibration) : nullptr),
+        estimator_(config_of(settings, calibration, args.check), calibration, {kQueueSeconds, settings.frame_slots}, listeners()),
         intake_(estimator_, calibration, clock_, taps()),
         lines_(std::make_unique<MavlinkLines>(lines_of(settings, player != nullptr), intake_)) {
     if (ros_ != nullptr) {
@@ -219,10 +223,22 @@ class Session {
       if (const auto signal = signals.wait()) return *signal;
       if (player_ != nullptr && player_->done()) return "the recording has ended";
       const TimeNs now = clock_.now();
+      if (preflight_ && all_done()) return "the check is done";
       if (duration > 0.0 && seconds_between(begin, now) >= duration) return "the time is over";
       say();
       tell(notifier, now);
     }
+  }
+
+  /// Of --check: throws InputError unless all is right.
+  void judge() const {
+    if (!preflight_) return;
+    int open = 0;
+    for (const live::PreflightItem& item : preflight_->items()) {
+      log_info("check: " + words_of(item));
+      open += item.result == live::PreflightItem::Result::right ? 0 : 1;
+    }
+    if (open > 0) throw InputError("check: " + std::to_string(open) + " items are not right");
   }
 
   void stop() {
@@ -245,8 +261,17 @@ class Session {
     return lines;
   }
 
-  static Config config_of(const live::LiveSettings& settings, const Calibration& calibration) {
+  [[nodiscard]] bool all_done() const {
+    const std::vector<live::PreflightItem> items = preflight_->items();
+    return std::all_of(items.begin(), items.end(), [](const live::PreflightItem& item) {
+      return item.result == live::PreflightItem::Result::right;
+    });
+  }
+
+  /// A check compares wheels and beams with cameras, which must not know of them.
+  static Config config_of(const live::LiveSettings& settings, const Calibration& calibration, bool check) {
     Config config = settings.estimator;
+    if (check && !calibration.cameras.empty()) config.filter.odometer.model = OdometerModel::none;
     config.performance.budget_ms = settings.budget_ms.value_or(live::default_budget_ms(calibration));
     return config;
   }
@@ -255,6 +280,7 @@ class Session {
     return {[this](const live::LiveFrame& frame, const Odometry& odometry) {
               report_.take(frame, odometry);
               files_.take(frame);
+              if (preflight_) preflight_->add(frame, odometry.calibration());
               send(frame);
             },
             [this](const live::LiveSample& sample) {
@@ -274,14 +300,29 @@ class Session {
   live::IntakeTaps taps() {
     return {[this](const ImuSample& sample, const std::optional<NavState>& state) {
               record_.add(sample);
+              check(sample);
               if (ros_ != nullptr) ros_->take(sample, state);
             },
-            [this](const EncoderSample& sample) { record_.add(sample); },
-            [this](const QueuedOdometry::Ranges& ranges) { record_.add(ranges); },
+            [this](const EncoderSample& sample) {
+              record_.add(sample);
+              check(sample);
+            },
+            [this](const QueuedOdometry::Ranges& ranges) {
+              record_.add(ranges);
+              check(ranges);
+            },
             [this](const StereoFrame& frame) { record_.add(frame); }};
   }
 
+  template <typename What>
+  void check(const What& what) {
+    if (preflight_) preflight_->add(what);
+  }
+
   void say() {
+    if (preflight_) {
+      for (const live::PreflightItem& item : preflight_->news()) log_info("check: " + words_of(item));
+    }
     for (const std::string& words : intake_.look()) log_warning(words);
     for (const std::string& words : lines_->look()) log_warning(words);
     if (cameras_) {
@@ -306,12 +347,24 @@ class Session {
     log(LogLevel::debug, report_.text() + "; " + rates);
   }
 
+  static std::string words_of(const live::PreflightItem& item) {
+    switch (item.result) {
+      case live::PreflightItem::Result::right:
+        return item.name + ": right: " + item.words;
+      case live::PreflightItem::Result::wrong:
+        return item.name + ": WRONG: " + item.words;
+      default:
+        return item.name + ": not done yet: " + item.words;
+    }
+  }
+
   LiveRos* ros_;
   live::Player* player_;
   live::LiveClock clock_;
   Report report_;
   Files files_;
   Record record_;
+  std::unique_ptr<live::Preflight> preflight_;  ///< with --check
   std::atomic<MavlinkLines*> outputs_{nullptr};  ///< null until all is there
   live::LiveEstimator estimator_;
   live::Intake intake_;
@@ -365,6 +418,7 @@ void run_live(const LiveArguments& args) {
   notifier.stopping();
   log_info("stops: " + reason);
   session.stop();
+  session.judge();
 }
 
 }  // namespace
@@ -380,6 +434,8 @@ void add_live_command(CLI::App& app) {
   command->add_option("--out", args->out, "Also write estimate.tum and states.csv to this folder, as ear run does");
   command->add_option("--record", args->record, "Write what comes in and what goes out to this MCAP file");
   command->add_option("--duration", args->duration, "Stop after so many seconds")->check(CLI::PositiveNumber);
+  command->add_flag("--check", args->check,
+                    "Before a flight, by hand: lift, push, turn and roll the vehicle, and see whether its sensors agree");
   if (const std::string missing = missing_ros_parts(); !missing.empty()) command->footer("Not in this program: " + missing);
   command->callback([args] { run_live(*args); });
 }
