@@ -40,10 +40,10 @@ struct LiveArguments {
   bool check = false;
 };
 
-constexpr long kLookNs = 200'000'000;      // between two looks at streams and signals
-constexpr double kStatusInterval = 1.0;    // [s] between words to systemd
+constexpr long kLookNs = 200'000'000;    // between two looks at streams and signals
+constexpr double kStatusInterval = 1.0;  // [s] between words to systemd
 constexpr double kQueueSeconds = 2.0;
-constexpr double kStuck = 5.0;             // [s] of an estimator that takes no samples while they come
+constexpr double kStuck = 5.0;  // [s] of an estimator that takes no samples while they come
 
 /// SIGINT and SIGTERM are taken from a queue, by the main thread; all threads that begin later inherit that.
 class StopSignals {
@@ -142,8 +142,9 @@ class Record {
 #ifdef EAR_WITH_ROSBAG2
     recorder_ = std::make_unique<live::Recorder>(file, calibration, files.folder());
 #else
-    throw InputError("--record: MCAP files are not built in: install libfastcdr-dev, libzstd-dev, liblz4-dev, "
-                     "libsqlite3-dev and zlib1g-dev, and build again");
+    throw InputError(
+        "--record: MCAP files are not built in: install libfastcdr-dev, libzstd-dev, liblz4-dev, "
+        "libsqlite3-dev and zlib1g-dev, and build again");
 #endif
   }
 
@@ -197,7 +198,8 @@ class Session {
         files_(args.out),
         record_(args.record, calibration, sensor_files),
         preflight_(args.check ? std::make_unique<live::Preflight>(calibration) : nullptr),
-        estimator_(config_of(settings, calibration, args.check), calibration, {kQueueSeconds, settings.frame_slots}, listeners()),
+        estimator_(config_of(settings, calibration, args.check), calibration, {kQueueSeconds, settings.frame_slots},
+                   listeners()),
         intake_(estimator_, calibration, clock_, taps()),
         lines_(std::make_unique<MavlinkLines>(lines_of(settings, player != nullptr), intake_)) {
     if (ros_ != nullptr) {
@@ -364,7 +366,7 @@ class Session {
   Report report_;
   Files files_;
   Record record_;
-  std::unique_ptr<live::Preflight> preflight_;  ///< with --check
+  std::unique_ptr<live::Preflight> preflight_;   ///< with --check
   std::atomic<MavlinkLines*> outputs_{nullptr};  ///< null until all is there
   live::LiveEstimator estimator_;
   live::Intake intake_;
@@ -402,10 +404,9 @@ void run_live(const LiveArguments& args) {
     opened.emplace(args.sensors, args.config);
     player = std::make_unique<live::Player>(opened->read({}));
   }
+  std::optional<Calibration> calibration = live_calibration(settings, player.get());
   std::unique_ptr<LiveRos> ros;
   if (settings.ros) ros = std::make_unique<LiveRos>(settings);
-
-  std::optional<Calibration> calibration = live_calibration(settings, player.get());
   if (ros && !player) {
     std::optional<std::string> signal;
     calibration = ros->complete(*calibration, [&] { return (signal = signals.wait()).has_value(); });
@@ -428,15 +429,18 @@ void add_live_command(CLI::App& app) {
   auto args = std::make_shared<LiveArguments>();
   command->add_option("--config", args->config, "Sensors, outputs and the log (docs/live.md)")
       ->check(CLI::ExistingFile);
-  command->add_option("--sensors", args->sensors,
-                      "A recording in place of the sensors, played in real time; its calibration, unless --config has one")
+  command
+      ->add_option("--sensors", args->sensors,
+                   "A recording in place of the sensors, played in real time; its calibration, unless --config has one")
       ->check(CLI::ExistingPath);
   command->add_option("--out", args->out, "Also write estimate.tum and states.csv to this folder, as ear run does");
   command->add_option("--record", args->record, "Write what comes in and what goes out to this MCAP file");
   command->add_option("--duration", args->duration, "Stop after so many seconds")->check(CLI::PositiveNumber);
-  command->add_flag("--check", args->check,
-                    "Before a flight, by hand: lift, push, turn and roll the vehicle, and see whether its sensors agree");
-  if (const std::string missing = missing_ros_parts(); !missing.empty()) command->footer("Not in this program: " + missing);
+  command->add_flag(
+      "--check", args->check,
+      "Before a flight, by hand: lift, push, turn and roll the vehicle, and see whether its sensors agree");
+  if (const std::string missing = missing_ros_parts(); !missing.empty())
+    command->footer("Not in this program: " + missing);
   command->callback([args] { run_live(*args); });
 }
 

@@ -12,8 +12,8 @@
 namespace ear::tools {
 namespace {
 
-constexpr double kWait = 0.2;                            // [s] between two looks
-constexpr std::chrono::milliseconds kDiscovery{1500};    // until the topics of a running vehicle are known
+constexpr double kWait = 0.2;                          // [s] between two looks
+constexpr std::chrono::milliseconds kDiscovery{1500};  // until the topics of a running vehicle are known
 
 bool states_all(const ros2::SensorTopics& topics) {
   return (!topics.imu.empty() || topics.imu_apart()) && !topics.left.empty();

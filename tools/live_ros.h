@@ -28,7 +28,8 @@ class LiveRos {
   [[nodiscard]] std::optional<Calibration> complete(const Calibration& known, const std::function<bool()>& stop);
 
   /// What goes out; before start(). `on_message` gets each message too: topic, type, stamp, CDR.
-  using OnMessage = std::function<void(const std::string&, const std::string&, TimeNs, const std::vector<std::uint8_t>&)>;
+  using OnMessage =
+      std::function<void(const std::string&, const std::string&, TimeNs, const std::vector<std::uint8_t>&)>;
   void publish(const Calibration& calibration, OnMessage on_message);
   /// Begins to read; once.
   void start(live::Intake& intake);

@@ -30,7 +30,8 @@ Eigen::Matrix3d mounting(const live::MavlinkSettings& settings, const Calibratio
 Calibration live_calibration(const live::LiveSettings& settings, const live::Player* player) {
   if (settings.calibration.empty()) {
     if (player != nullptr) return player->calibration();
-    if (!settings.ros) throw InputError(located(settings.file, 0, "calibration", "missing: a folder with <sensor>/sensor.yaml"));
+    if (!settings.ros)
+      throw InputError(located(settings.file, 0, "calibration", "missing: a folder with <sensor>/sensor.yaml"));
     return settings.kalibr.size() == 2 ? load_kalibr(settings.kalibr[0], settings.kalibr[1]) : Calibration{};
   }
   Warnings warnings;
@@ -95,7 +96,8 @@ MavlinkLines::MavlinkLines(const std::vector<live::MavlinkSettings>& settings, l
     }
     const mavlink::Sender self{static_cast<std::uint8_t>(one.system)};
     const live::LiveClock& clock = intake.clock();
-    line.link = std::make_unique<mavlink::Link>(one.address, self, [&clock] { return clock.now(); }, listener);
+    line.link = std::make_unique<mavlink::Link>(
+        one.address, self, [&clock] { return clock.now(); }, listener);
     if (one.send) {
       line.output = std::make_unique<live::MavlinkOutput>(*line.link, mounting(one, intake.calibration()),
                                                           intake.calibration().imu);

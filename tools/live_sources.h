@@ -42,7 +42,8 @@ class SensorFiles {
 void require_usable(const Calibration& calibration, const live::LiveSettings& settings);
 
 /// Opens the video devices; null where the settings name none. Throws std::runtime_error.
-[[nodiscard]] std::unique_ptr<live::StereoCamera> open_cameras(const live::LiveSettings& settings, live::Intake& intake);
+[[nodiscard]] std::unique_ptr<live::StereoCamera> open_cameras(const live::LiveSettings& settings,
+                                                               live::Intake& intake);
 
 /// The lines to flight controllers and microcontrollers. A line's thread runs as long as this lives.
 class MavlinkLines {

@@ -97,8 +97,8 @@ Participant::~Participant() { dds_delete(entity_); }
 std::vector<Publication> Participant::publications() const {
   std::vector<void*> samples(kMostPublications, nullptr);
   std::vector<dds_sample_info_t> infos(kMostPublications);
-  const dds_return_t count =
-      dds_read(discovery_, samples.data(), infos.data(), kMostPublications, static_cast<std::uint32_t>(kMostPublications));
+  const dds_return_t count = dds_read(discovery_, samples.data(), infos.data(), kMostPublications,
+                                      static_cast<std::uint32_t>(kMostPublications));
   std::vector<Publication> all;
   dds_guid_t self{};
   dds_get_guid(entity_, &self);
@@ -234,8 +234,8 @@ void Subscription::adapt() {
     dds_requested_incompatible_qos_status_t status{};
     dds_get_requested_incompatible_qos_status(reader->reader, &status);
     if (status.total_count > reader->incompatible) {
-      words.push_back(wanted.topic + ": its publisher's quality of service does not fit: " +
-                      name_of_policy(status.last_policy_id));
+      words.push_back(wanted.topic +
+                      ": its publisher's quality of service does not fit: " + name_of_policy(status.last_policy_id));
     }
     reader->incompatible = status.total_count;
   }

@@ -81,8 +81,8 @@ struct Received {
   RawBytes cdr;
 };
 
-/// Reads topics on a thread of its own. Each reader asks for what its publishers offer, reliable or best-effort, so that
-/// either kind is heard, also after one was replaced by the other.
+/// Reads topics on a thread of its own. Each reader asks for what its publishers offer, reliable or best-effort, so
+/// that either kind is heard, also after one was replaced by the other.
 class Subscription {
  public:
   Subscription(const Participant& participant, std::vector<Wanted> wanted, std::function<void(const Received&)> take);
@@ -107,10 +107,10 @@ class Subscription {
   std::function<void(const Received&)> take_;
   std::vector<std::unique_ptr<Reader>> readers_;
   std::int32_t waitset_ = 0;
-  std::mutex mutex_;                ///< of the words
+  std::mutex mutex_;  ///< of the words
   std::vector<std::string> words_;
   std::atomic<bool> stop_ = false;
-  std::thread thread_;              ///< last: it uses all else
+  std::thread thread_;  ///< last: it uses all else
 };
 
 }  // namespace ear::dds

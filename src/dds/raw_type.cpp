@@ -92,8 +92,8 @@ bool to_sample(const ddsi_serdata* data, void* sample, void** /*buffer*/, void* 
   *static_cast<std::vector<std::uint8_t>*>(sample) = raw(data).bytes;
   return true;
 }
-bool untyped_to_sample(const ddsi_sertype* /*type*/, const ddsi_serdata* /*data*/, void* /*sample*/,
-                       void** /*buffer*/, void* /*limit*/) {
+bool untyped_to_sample(const ddsi_sertype* /*type*/, const ddsi_serdata* /*data*/, void* /*sample*/, void** /*buffer*/,
+                       void* /*limit*/) {
   return true;
 }
 

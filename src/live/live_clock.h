@@ -1,4 +1,5 @@
-// The clock of a live process: stamps of sensors that have no clock of their own, and the time of day for those that do.
+// The clock of a live process: stamps of sensors that have no clock of their own, and the time of day for those that
+// do.
 #pragma once
 
 #include <chrono>

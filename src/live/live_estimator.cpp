@@ -13,11 +13,11 @@ namespace {
 using SteadyClock = std::chrono::steady_clock;
 
 constexpr TimeNs kNever = std::numeric_limits<TimeNs>::min();
-constexpr std::chrono::milliseconds kPatience{50};     // with readings that belong before a frame and are not there
-constexpr std::chrono::milliseconds kNoSamples{500};   // a frame waits for inertial samples, at most
-constexpr TimeNs kLongestHeld = 300'000'000;           // samples are handed over without a frame after this time
-constexpr TimeNs kDead = 5;                            // periods without a reading: the sensor is not waited for
-constexpr long kWakeNs = 5'000'000;                    // the thread looks again, whatever was missed
+constexpr std::chrono::milliseconds kPatience{50};    // with readings that belong before a frame and are not there
+constexpr std::chrono::milliseconds kNoSamples{500};  // a frame waits for inertial samples, at most
+constexpr TimeNs kLongestHeld = 300'000'000;          // samples are handed over without a frame after this time
+constexpr TimeNs kDead = 5;                           // periods without a reading: the sensor is not waited for
+constexpr long kWakeNs = 5'000'000;                   // the thread looks again, whatever was missed
 
 TimeNs period(double rate_hz) { return std::llround(1e9 / rate_hz); }
 

@@ -1,8 +1,8 @@
 // The estimator of a live process: sensors' threads add samples, a thread of its own estimates.
 //
 // The order in which samples reach the estimator does not depend on how busy the machine is: a frame is handed over
-// once the inertial samples reach it, and the wheels' and beams' readings that are no later than these are there. So the same
-// samples from a recording give the same estimates, bit for bit.
+// once the inertial samples reach it, and the wheels' and beams' readings that are no later than these are there. So
+// the same samples from a recording give the same estimates, bit for bit.
 #pragma once
 
 #include <semaphore.h>
@@ -86,8 +86,8 @@ class LiveEstimator {
   Beside encoder_, laser_;
   LiveListeners listeners_;
   BlindSteps steps_;
-  TimeNs reached_ns_;                                            ///< the newest inertial stamp taken
-  TimeNs handed_over_ns_ = 0;                                    ///< up to here samples were given to the estimator
+  TimeNs reached_ns_;                                           ///< the newest inertial stamp taken
+  TimeNs handed_over_ns_ = 0;                                   ///< up to here samples were given to the estimator
   std::optional<std::chrono::steady_clock::time_point> waits_;  ///< since when a frame waits for other sensors
   std::atomic<std::uint64_t> impatient_{0};
   sem_t news_{};

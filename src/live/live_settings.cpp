@@ -72,7 +72,8 @@ CameraSettings load_cameras(const YamlMap& map, const fs::path& file) {
 }
 
 RosSettings load_ros(const YamlMap& map) {
-  map.require_only({"domain", "publish", "odometry", "predicted", "path", "diagnostics", "odom_frame", "base_frame", "tf"});
+  map.require_only(
+      {"domain", "publish", "odometry", "predicted", "path", "diagnostics", "odom_frame", "base_frame", "tf"});
   RosSettings settings;
   if (map.has("domain")) {
     settings.domain = map.get<int>("domain");
@@ -113,7 +114,8 @@ LogOptions load_log(const YamlMap& map, const fs::path& file) {
 
 LiveSettings load_live_settings(const fs::path& file) {
   const YamlMap map = YamlMap::load(file);
-  map.require_only({"calibration", "kalibr", "settings", "budget_ms", "frame_slots", "mavlink", "cameras", "ros", "topics", "log"});
+  map.require_only(
+      {"calibration", "kalibr", "settings", "budget_ms", "frame_slots", "mavlink", "cameras", "ros", "topics", "log"});
   LiveSettings settings;
   settings.file = file;
   if (map.has("calibration")) settings.calibration = path_of(file, map.get<std::string>("calibration"));

@@ -39,12 +39,12 @@ struct RosSettings {
 };
 
 struct LiveSettings {
-  std::filesystem::path file;                  ///< this configuration's
-  std::filesystem::path calibration;           ///< folder with <sensor>/sensor.yaml; empty: not given
-  std::vector<std::filesystem::path> kalibr;   ///< camchain and imu.yaml in place of the cameras and the IMU
-  Config estimator;                            ///< from the key `settings`
-  std::optional<double> budget_ms;             ///< nothing: as default_budget_ms()
-  std::size_t frame_slots = 8;                 ///< frames that wait for the estimator, at most
+  std::filesystem::path file;                 ///< this configuration's
+  std::filesystem::path calibration;          ///< folder with <sensor>/sensor.yaml; empty: not given
+  std::vector<std::filesystem::path> kalibr;  ///< camchain and imu.yaml in place of the cameras and the IMU
+  Config estimator;                           ///< from the key `settings`
+  std::optional<double> budget_ms;            ///< nothing: as default_budget_ms()
+  std::size_t frame_slots = 8;                ///< frames that wait for the estimator, at most
   std::vector<MavlinkSettings> mavlink;
   std::optional<CameraSettings> cameras;
   std::optional<RosSettings> ros;

@@ -9,10 +9,10 @@
 namespace ear::live {
 namespace {
 
-constexpr double kFarFromNow = 1.0;           // [s] of a stamp: it is of another clock than the one that answers
-constexpr std::uint8_t kNoReturn = 1;         // DISTANCE_SENSOR.signal_quality: invalid
-constexpr double kLargestDistance = 1e9;      // [m] of a wheel
-constexpr std::uint64_t kManyWithout = 50;    // samples before words about a clock that does not answer
+constexpr double kFarFromNow = 1.0;         // [s] of a stamp: it is of another clock than the one that answers
+constexpr std::uint8_t kNoReturn = 1;       // DISTANCE_SENSOR.signal_quality: invalid
+constexpr double kLargestDistance = 1e9;    // [m] of a wheel
+constexpr std::uint64_t kManyWithout = 50;  // samples before words about a clock that does not answer
 
 /// What a wheel rolled, as its encoder would have counted it.
 std::int64_t counts(double distance, double radius, std::int64_t resolution) {

@@ -20,8 +20,8 @@ constexpr double kLift = 0.15, kPush = 0.3;  // [m]
 constexpr double kTurn = 0.7, kRoll = 0.17;  // [rad]
 constexpr double kStraight = 0.35;           // [rad] of a push
 constexpr double kDegree = M_PI / 180.0;
-constexpr double kTolerance = 0.15;          // of a scale, by hand
-constexpr double kLargestDelay = 0.01;       // [s] of the camera, against the calibration
+constexpr double kTolerance = 0.15;     // of a scale, by hand
+constexpr double kLargestDelay = 0.01;  // [s] of the camera, against the calibration
 
 const char *const kStand = "stand", *const kLiftName = "lift", *const kPushName = "push", *const kTurnName = "turn",
                   *const kRollName = "roll", *const kDelay = "delay";
@@ -52,7 +52,8 @@ Preflight::Preflight(const Calibration& calibration) : calibration_(calibration)
   };
   want(kStand, "let it stand level for two seconds");
   if (calibration.lasers && !calibration.cameras.empty()) want(kLiftName, "lift it by 20 cm, level, and hold it still");
-  if (calibration.encoder && !calibration.cameras.empty()) want(kPushName, "push it straight ahead by half a metre, and stop");
+  if (calibration.encoder && !calibration.cameras.empty())
+    want(kPushName, "push it straight ahead by half a metre, and stop");
   if (calibration.encoder) want(kTurnName, "turn it to the left on its wheels by a quarter, and stop");
   want(kRollName, "roll it to one side by 20 degrees, and hold it still");
   if (!calibration.cameras.empty()) want(kDelay, "turn it to and fro before the cameras for ten seconds");
@@ -125,7 +126,8 @@ void Preflight::add(const LiveFrame& frame, const Calibration& learned) {
   const double shown = learned.camera_time_offset - calibration_.camera_time_offset;
   if (seconds_between(frame.health.since_ns, frame.t_ns) < 10.0) return;
   set(kDelay, std::abs(shown) < kLargestDelay,
-      text("the images are %.1f ms %s than the calibration says", 1e3 * std::abs(shown), shown < 0 ? "older" : "younger"));
+      text("the images are %.1f ms %s than the calibration says", 1e3 * std::abs(shown),
+           shown < 0 ? "older" : "younger"));
 }
 
 void Preflight::judge_rest(const Rest& rest) {
@@ -168,14 +170,17 @@ void Preflight::judge_lift(const Rest& from, const Rest& to) {
 void Preflight::judge_push(const Rest& from, const Rest& to) {
   const Eigen::Isometry3d& T_BO = calibration_.encoder->T_BO;
   const Eigen::Matrix3d R_from = from.state->q_WB.toRotationMatrix(), R_to = to.state->q_WB.toRotationMatrix();
-  const Eigen::Vector3d way = (to.state->p_WB + R_to * T_BO.translation()) - (from.state->p_WB + R_from * T_BO.translation());
+  const Eigen::Vector3d way =
+      (to.state->p_WB + R_to * T_BO.translation()) - (from.state->p_WB + R_from * T_BO.translation());
   const Eigen::Vector3d way_O = T_BO.linear().transpose() * R_from.transpose() * way;
   if (std::abs(way_O.x()) < kPush || Eigen::AngleAxisd(R_rest_).angle() > kStraight) return;
   const double left = (to.wheel[0] - from.wheel[0]) / way_O.x(), right = (to.wheel[1] - from.wheel[1]) / way_O.x();
   std::string words = text("by %.2f m ahead, say the cameras; wheels %.2f and %.2f times that", way_O.x(), left, right);
   const bool good = about_one(left) && about_one(right);
-  if (left < 0.0 || right < 0.0) words += ": a wheel counts backward, or `forward` is the wrong way";
-  else if (!good) words += ": radius, counts per turn or the cameras' scale is wrong";
+  if (left < 0.0 || right < 0.0)
+    words += ": a wheel counts backward, or `forward` is the wrong way";
+  else if (!good)
+    words += ": radius, counts per turn or the cameras' scale is wrong";
   set(kPushName, good, words);
 }
 
@@ -185,9 +190,12 @@ void Preflight::judge_turn(const Rest& from, const Rest& to) {
   const double left = to.wheel[0] - from.wheel[0], right = to.wheel[1] - from.wheel[1];
   if (std::abs(turn) < kTurn || std::abs(left) + std::abs(right) < 0.05) return;
   const double ratio = (right - left) / calibration_.encoder->track_width / turn;
-  std::string words = text("by %.0f degrees to the left, says the gyroscope; the wheels %.2f times that", turn / kDegree, ratio);
-  if (ratio < 0.0) words += ": left and right are swapped, or the gyroscope's sign is wrong";
-  else if (!about_one(ratio)) words += ": track width, radius or the gyroscope's scale is wrong";
+  std::string words =
+      text("by %.0f degrees to the left, says the gyroscope; the wheels %.2f times that", turn / kDegree, ratio);
+  if (ratio < 0.0)
+    words += ": left and right are swapped, or the gyroscope's sign is wrong";
+  else if (!about_one(ratio))
+    words += ": track width, radius or the gyroscope's scale is wrong";
   set(kTurnName, about_one(ratio), words);
 }
 

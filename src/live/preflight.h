@@ -71,8 +71,8 @@ class Preflight {
   Window window_;
   std::optional<TimeNs> last_ns_;
   Eigen::Matrix3d R_rest_ = Eigen::Matrix3d::Identity();  ///< body now to body at the last rest
-  std::optional<Rest> rest_;                               ///< the last one
-  Rest now_;                                               ///< the newest values of all sensors
+  std::optional<Rest> rest_;                              ///< the last one
+  Rest now_;                                              ///< the newest values of all sensors
   std::optional<EncoderSample> first_count_;
 };
 

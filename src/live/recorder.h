@@ -26,8 +26,8 @@ namespace ear::live {
 /// counted. Samples become messages as `ear export --format mcap` writes them, so that `ear run` reads the file.
 class Recorder {
  public:
-  /// The file must not be there yet. `calibration_folder` has the <sensor>/sensor.yaml that `calibration` was read from;
-  /// they go into the file. Throws InputError.
+  /// The file must not be there yet. `calibration_folder` has the <sensor>/sensor.yaml that `calibration` was read
+  /// from; they go into the file. Throws InputError.
   Recorder(const std::filesystem::path& file, const Calibration& calibration,
            const std::filesystem::path& calibration_folder);
   ~Recorder();  ///< as close()
@@ -67,7 +67,7 @@ class Recorder {
   void run();
 
   std::unique_ptr<rosbag2::RecordingWriter> writer_;  ///< the thread's
-  std::mutex mutex_;  ///< of what follows, up to the counter
+  std::mutex mutex_;                                  ///< of what follows, up to the counter
   std::condition_variable changed_;
   std::deque<Item> items_;
   std::size_t bytes_ = 0;  ///< of these

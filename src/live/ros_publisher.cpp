@@ -11,9 +11,11 @@ RosPublisher::RosPublisher(const dds::Participant& participant, RosMessages mess
       odometry_(participant, messages_.names().odometry, ros2::Odometry::kType, {}),
       diagnostics_(participant, messages_.names().diagnostics, ros2::DiagnosticArray::kType, {}) {
   const RosNames& names = messages_.names();
-  if (!names.predicted.empty()) predicted_.emplace(participant, names.predicted, ros2::Odometry::kType, dds::Writer::Options{});
+  if (!names.predicted.empty())
+    predicted_.emplace(participant, names.predicted, ros2::Odometry::kType, dds::Writer::Options{});
   if (names.tf) tf_.emplace(participant, "/tf", ros2::TfMessage::kType, dds::Writer::Options{true, false, 100});
-  if (!names.path.empty()) path_writer_.emplace(participant, names.path, ros2::Path::kType, dds::Writer::Options{true, false, 1});
+  if (!names.path.empty())
+    path_writer_.emplace(participant, names.path, ros2::Path::kType, dds::Writer::Options{true, false, 1});
 }
 
 template <typename Message>

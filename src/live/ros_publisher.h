@@ -17,7 +17,8 @@ class RosPublisher {
  public:
   /// `participant` must outlive it. Throws std::runtime_error.
   /// `on_message` is told of what the estimator's thread sends, if it is there: topic, type, stamp, CDR.
-  using OnMessage = std::function<void(const std::string&, const std::string&, TimeNs, const std::vector<std::uint8_t>&)>;
+  using OnMessage =
+      std::function<void(const std::string&, const std::string&, TimeNs, const std::vector<std::uint8_t>&)>;
   RosPublisher(const dds::Participant& participant, RosMessages messages, OnMessage on_message);
 
   /// By the inertial sensor's thread, after each sample.

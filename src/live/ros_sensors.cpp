@@ -200,7 +200,8 @@ std::string RosCalibration::missing() const {
   std::string text = messages_.missing_for_cameras();
   const std::string beams = messages_.missing_for_beams();
   if (!beams.empty()) text += (text.empty() ? "" : "; ") + beams;
-  if (text.empty() && !topics_.left.empty() && image_stamps_.size() < kImagesForRate) text = "images of " + topics_.left;
+  if (text.empty() && !topics_.left.empty() && image_stamps_.size() < kImagesForRate)
+    text = "images of " + topics_.left;
   return text;
 }
 

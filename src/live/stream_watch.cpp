@@ -8,12 +8,12 @@
 namespace ear::live {
 namespace {
 
-constexpr double kSilence = 0.5;      // [s]
-constexpr double kInterval = 0.4;     // [s] over which a rate is measured, at least
-constexpr double kFlood = 3.0;        // times the rate in the calibration
+constexpr double kSilence = 0.5;   // [s]
+constexpr double kInterval = 0.4;  // [s] over which a rate is measured, at least
+constexpr double kFlood = 3.0;     // times the rate in the calibration
 constexpr double kSlow = 0.5;
-constexpr double kNormal = 0.2;       // back to normal: the rate again, within this part
-constexpr double kFewest = 10.0;      // [Hz] above this part of the calibration's rate, no fewer
+constexpr double kNormal = 0.2;        // back to normal: the rate again, within this part
+constexpr double kFewest = 10.0;       // [Hz] above this part of the calibration's rate, no fewer
 constexpr TimeNs kStep = 250'000'000;  // a clock that goes this far ahead of ours or falls behind has been set
 
 template <typename... Values>

@@ -37,10 +37,10 @@ class StreamWatch {
   std::string name_;
   double expected_hz_;
   std::atomic<std::uint64_t> count_{0};
-  std::atomic<TimeNs> arrival_ns_;         ///< of the newest
-  std::atomic<TimeNs> step_ns_{0};         ///< the last step of its clock against ours
-  std::atomic<std::uint64_t> steps_{0};    ///< how many there were
-  TimeNs delay_ns_ = 0;                    ///< the sensor's thread: of the newest, in our clock
+  std::atomic<TimeNs> arrival_ns_;       ///< of the newest
+  std::atomic<TimeNs> step_ns_{0};       ///< the last step of its clock against ours
+  std::atomic<std::uint64_t> steps_{0};  ///< how many there were
+  TimeNs delay_ns_ = 0;                  ///< the sensor's thread: of the newest, in our clock
 
   // Of the thread that looks.
   std::uint64_t seen_ = 0, seen_steps_ = 0;

@@ -95,7 +95,8 @@ class V4l2Device final : public VideoDevice {
       pixels.height = static_cast<std::uint32_t>(height);
       pixels.pixelformat = candidate.code;
       if (::ioctl(file_, VIDIOC_S_FMT, &format) != 0 || pixels.pixelformat != candidate.code) continue;
-      if (pixels.width != static_cast<std::uint32_t>(width) || pixels.height != static_cast<std::uint32_t>(height)) continue;
+      if (pixels.width != static_cast<std::uint32_t>(width) || pixels.height != static_cast<std::uint32_t>(height))
+        continue;
       layout_ = candidate.layout;
       width_ = width;
       height_ = height;

@@ -1,4 +1,5 @@
-// A video device, as little of it as is needed: grey images with their times. V4L2 behind it, or what a test puts there.
+// A video device, as little of it as is needed: grey images with their times. V4L2 behind it, or what a test puts
+// there.
 #pragma once
 
 #include <cstdint>

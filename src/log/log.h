@@ -25,8 +25,8 @@ inline void log_error(const std::string& message) noexcept { log(LogLevel::error
 struct LogOptions {
   LogLevel level = LogLevel::warning;  ///< of standard error
   std::filesystem::path file;          ///< also here, with times, from level info on; empty: nowhere else
-  std::size_t most_bytes = 0;          ///< of the file: then it begins anew, and older ones are kept as file.1, ...; 0: any
-  std::size_t older_files = 3;         ///< so many
+  std::size_t most_bytes = 0;   ///< of the file: then it begins anew, and older ones are kept as file.1, ...; 0: any
+  std::size_t older_files = 3;  ///< so many
 };
 
 /// Makes the logger "ear" anew. Where standard error goes to systemd's journal, lines begin with the level as it reads

@@ -12,9 +12,9 @@ constexpr double kUsualMargin = 1e-3;  // [s] and so much more
 constexpr double kForget = 1.01;       // the quickest round trip grows by this with each exchange
 constexpr double kStep = 0.05;         // [s] from the offset: its clock has been set, if it stays so
 constexpr int kStepExchanges = 3;
-constexpr double kFinalGain = 0.02;    // of the offset, once it is known
+constexpr double kFinalGain = 0.02;  // of the offset, once it is known
 constexpr double kFinalDrift = 2e-4;
-constexpr double kMostDrift = 5e-4;    // of any crystal
+constexpr double kMostDrift = 5e-4;  // of any crystal
 
 bool is_stamp(TimeNs t_ns) { return t_ns > -kLargestStamp && t_ns < kLargestStamp; }
 TimeNs to_ns(double seconds) { return static_cast<TimeNs>(std::llround(1e9 * seconds)); }

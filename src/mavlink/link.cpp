@@ -24,11 +24,9 @@ std::optional<TimeSync> answer_to(const Packet& packet, const Sender& self, Time
 }
 
 Link::Link(const std::string& address, const Sender& sender, std::function<TimeNs()> clock, LinkListener listener)
-    : transport_(address),
-      sender_(sender),
-      clock_(std::move(clock)),
-      listener_(std::move(listener)),
-      thread_([this] { converse(); }) {}
+    : transport_(address), sender_(sender), clock_(std::move(clock)), listener_(std::move(listener)), thread_([this] {
+        converse();
+      }) {}
 
 Link::~Link() {
   stop_ = true;

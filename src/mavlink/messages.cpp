@@ -189,7 +189,7 @@ Payload to_payload(const DistanceSensor& message) {
       .put(std::uint8_t{0})  // MAV_DISTANCE_SENSOR_LASER
       .put(message.id)
       .put(kFacesDown)
-      .put(std::uint8_t{255});  // covariance: not known
+      .put(std::uint8_t{255});                        // covariance: not known
   for (int i = 0; i < 6; ++i) writer.put_float(0.0);  // fields of view, quaternion
   return writer.put(message.signal_quality).done();
 }

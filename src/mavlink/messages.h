@@ -1,6 +1,6 @@
-// The few MAVLink messages that this project sends or reads, and their payloads: own words out, sensors in. Fields, their order on the wire and
-// the numbers are those of MAVLink's common.xml (https://mavlink.io/en/messages/common.html). docs/mavlink.md has the
-// reasons.
+// The few MAVLink messages that this project sends or reads, and their payloads: own words out, sensors in. Fields,
+// their order on the wire and the numbers are those of MAVLink's common.xml
+// (https://mavlink.io/en/messages/common.html). docs/mavlink.md has the reasons.
 #pragma once
 
 #include <Eigen/Core>
@@ -79,7 +79,7 @@ struct OdometryMessage {
 
 /// What a flight controller's IMU measures, in SI: HIGHRES_IMU, or SCALED_IMU with its coarser steps. Axes as sent.
 struct ImuMessage {
-  std::int64_t time_us = 0;                       ///< since the sender started, or since 1970
+  std::int64_t time_us = 0;                         ///< since the sender started, or since 1970
   Eigen::Vector3d accel = Eigen::Vector3d::Zero();  ///< [m/s^2]
   Eigen::Vector3d gyro = Eigen::Vector3d::Zero();   ///< [rad/s]
   std::uint8_t id = 0;                              ///< of HIGHRES_IMU

@@ -37,7 +37,9 @@ struct Vehicle {
   std::vector<EncoderSample> wheels;
   std::vector<QueuedOdometry::Ranges> ranges;
   LiveEstimator estimator{Config{}, calibration(), {}, {}};
-  Intake intake{estimator, calibration(), clock,
+  Intake intake{estimator,
+                calibration(),
+                clock,
                 {[this](const ImuSample& s, const std::optional<NavState>&) { imu.push_back(s); },
                  [this](const EncoderSample& s) { wheels.push_back(s); },
                  [this](const QueuedOdometry::Ranges& s) { ranges.push_back(s); }, nullptr}};

@@ -64,12 +64,12 @@ std::vector<Frame> frames_of(std::unique_ptr<VideoDevice> left, std::unique_ptr<
   std::vector<Frame> frames;
   const LiveClock clock;
   LiveEstimator estimator(Config{}, two_cameras(), {2.0, 16}, {});
-  Intake intake(estimator, two_cameras(), clock, {nullptr, nullptr, nullptr, [&](const StereoFrame& frame) {
-                                                    const std::lock_guard lock(mutex);
-                                                    const int other = frame.right.empty() ? -1 : frame.right.data[0];
-                                                    frames.push_back({frame.t_ns - clock.from_monotonic(0),
-                                                                      frame.left.data[0], other});
-                                                  }});
+  Intake intake(estimator, two_cameras(), clock,
+                {nullptr, nullptr, nullptr, [&](const StereoFrame& frame) {
+                   const std::lock_guard lock(mutex);
+                   const int other = frame.right.empty() ? -1 : frame.right.data[0];
+                   frames.push_back({frame.t_ns - clock.from_monotonic(0), frame.left.data[0], other});
+                 }});
   StereoCamera camera(std::move(left), std::move(right), delay, intake);
   for (int i = 0; i < 500; ++i) {
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
@@ -86,7 +86,8 @@ std::vector<Frame> frames_of(std::unique_ptr<VideoDevice> left, std::unique_ptr<
 }  // namespace
 
 TEST_CASE("stereo camera: side by side") {
-  const auto frames = frames_of(std::make_unique<FakeDevice>(2 * kWidth, std::deque<TimeNs>{100, 133}), nullptr, 2, 0.01);
+  const auto frames =
+      frames_of(std::make_unique<FakeDevice>(2 * kWidth, std::deque<TimeNs>{100, 133}), nullptr, 2, 0.01);
   REQUIRE(frames.size() == 2);
   CHECK(frames[0].t_ns == 90 * kMs);
   CHECK(frames[0].left == 0);

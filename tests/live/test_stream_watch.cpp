@@ -9,7 +9,8 @@ namespace {
 
 constexpr TimeNs kMs = 1'000'000;
 
-/// Samples at a rate from `begin` to `end` [ms], stamped `offset` [ms] away from when they come; what is said meanwhile.
+/// Samples at a rate from `begin` to `end` [ms], stamped `offset` [ms] away from when they come; what is said
+/// meanwhile.
 std::vector<std::string> feed(StreamWatch& watch, TimeNs begin, TimeNs end, double rate_hz, TimeNs offset = 0) {
   std::vector<std::string> said;
   double next = static_cast<double>(begin);
