@@ -2,6 +2,7 @@
 
 #include <time.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cmath>
 #include <limits>
@@ -13,10 +14,10 @@ namespace {
 using SteadyClock = std::chrono::steady_clock;
 
 constexpr TimeNs kNever = std::numeric_limits<TimeNs>::min();
-constexpr std::chrono::milliseconds kPatience{50};    // with readings that belong before a frame and are not there
+constexpr std::chrono::milliseconds kPatience{100};   // with readings that belong before a frame and are not there
 constexpr std::chrono::milliseconds kNoSamples{500};  // a frame waits for inertial samples, at most
 constexpr TimeNs kLongestHeld = 300'000'000;          // samples are handed over without a frame after this time
-constexpr TimeNs kDead = 5;                           // periods without a reading: the sensor is not waited for
+constexpr TimeNs kDead = 500'000'000;                 // without a reading: the sensor is not waited for
 constexpr long kWakeNs = 5'000'000;                   // the thread looks again, whatever was missed
 
 TimeNs period(double rate_hz) { return std::llround(1e9 / rate_hz); }
@@ -156,7 +157,7 @@ bool LiveEstimator::is_owed(const Beside& stream) const {
   const TimeNs newest = stream.newest_ns;
   if (stream.period_ns == 0 || newest == 0) return false;
   const TimeNs age = duration_ns(newest, reached_ns_);
-  return age >= stream.period_ns - stream.period_ns / 10 && age < kDead * stream.period_ns;
+  return age >= stream.period_ns - stream.period_ns / 10 && age < std::max(kDead, 5 * stream.period_ns);
 }
 
 void LiveEstimator::report(std::optional<Estimate> estimate, TimeNs t_ns) {
