@@ -22,7 +22,7 @@ function(hash_sources result)
 endfunction()
 
 hash_sources(estimator include filter smoother frontend src tools/evaluation tools/experiments tools/paper/measure
-             tools/estimators.h tools/estimators.cpp tools/replay.cpp tools/blind_steps.h tools/processor_time.h)
+             tools/estimators.h tools/estimators.cpp tools/replay.cpp tools/processor_time.h)
 hash_sources(simulator include tools/simulator)
 file(WRITE ${OUTPUT} "#include \"tools/paper/source_hashes.h\"\n
 namespace ear::paper {\n

@@ -181,6 +181,11 @@ Progress QueuedOdometry::process(std::optional<Estimate>& estimate) {
   return estimate ? Progress::estimated : Progress::taken;
 }
 
+std::optional<TimeNs> QueuedOdometry::next_frame_ns() const {
+  const Frame* const frame = frames_.queue.front();
+  return frame == nullptr ? std::nullopt : std::optional(imu_time(frame->t_ns));
+}
+
 std::optional<Estimate> QueuedOdometry::step(TimeNs t_ns) {
   hand_over(t_ns);
   std::optional<Estimate> estimate = odometry_.step(t_ns);

@@ -66,6 +66,8 @@ class QueuedOdometry {
   /// (PerformanceConfig::budget_ms), frames but the newest are dropped while more than half of the inertial samples'
   /// queue waits.
   Progress process(std::optional<Estimate>& estimate);
+  /// The time of the oldest frame that waits (IMU time), or nothing.
+  [[nodiscard]] std::optional<TimeNs> next_frame_ns() const;
   void start_at(const GivenStart& start) { odometry_.start_at(start); }
   std::optional<Estimate> step(TimeNs t_ns);
   void reset();

@@ -23,6 +23,7 @@
 #include "tools/bench_figures.h"
 #include "tools/commands.h"
 #include "tools/floor.h"
+#include "tools/opened_recording.h"
 #include "tools/processor_time.h"
 #include "tools/replay.h"
 
@@ -182,7 +183,8 @@ void bench(const BenchArguments& args) {
   const Config config = args.config.empty() ? Config{} : load_config(args.config);
   std::optional<BenchFigures> before;  // read first: a wrong file is said at once
   if (!args.compare.empty()) before = read_figures(args.compare);
-  Recording recording(args.recording);
+  const OpenedRecording opened(args.recording, args.config);
+  Recording recording = opened.read({});
   if (recording.calibration().cameras.size() < 2) {
     throw std::runtime_error(args.recording.string() + ": the benchmark needs a stereo pair");
   }
@@ -202,7 +204,8 @@ void bench(const BenchArguments& args) {
 void add_bench_command(CLI::App& app) {
   auto* command = app.add_subcommand("bench", "Measure the time per stereo frame and stage");
   auto args = std::make_shared<BenchArguments>();
-  command->add_option("RECORDING", args->recording, "Folder in the EuRoC/ASL layout (docs/recordings.md)")->required();
+  command->add_option("RECORDING", args->recording, "Folder in the EuRoC/ASL layout, or a bag (docs/bags.md)")
+      ->required();
   command->add_option("--config", args->config, "Settings; what it leaves out keeps its default")
       ->check(CLI::ExistingFile);
   command->add_flag("--json", args->json, "The figures as JSON, for --compare");

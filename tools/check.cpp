@@ -121,7 +121,8 @@ void try_estimator(const Config& config, RecordingReport& report) {
 void check(const CheckArguments& arguments) {
   const Config config = arguments.config.empty() ? Config{} : load_config(arguments.config);
   const OpenedRecording opened(arguments.recording, arguments.config);
-  RecordingReport report = check_recording(opened.folder(), arguments.calibration_files);
+  RecordingReport report = check_recording([&](const RecordingOptions& options) { return opened.read(options); },
+                                           arguments.calibration_files);
   try_estimator(config, report);
   if (arguments.json) {
     std::cout << to_json(report).dump(2) << '\n';
@@ -137,7 +138,9 @@ void add_check_command(CLI::App& app) {
   const auto arguments = std::make_shared<CheckArguments>();
   CLI::App* const command =
       app.add_subcommand("check", "Say whether a recording can be used, and what is odd about it");
-  command->add_option("recording", arguments->recording, "Folder of the recording, or a ROS 1 bag")->required();
+  command
+      ->add_option("recording", arguments->recording, "Folder of the recording, or a bag of ROS 1 or 2 (docs/bags.md)")
+      ->required();
   command->add_option("--calibration", arguments->calibration_files,
                       "Kalibr's camchain-imucam.yaml or imu.yaml, instead of the recording's own; may be given twice");
   command

@@ -12,5 +12,6 @@ void add_check_command(CLI::App& app);
 void add_bench_command(CLI::App& app);
 void add_export_command(CLI::App& app);
 void add_experiments_command(CLI::App& app);
+void add_live_command(CLI::App& app);
 
 }  // namespace ear::tools

@@ -1,14 +1,16 @@
-// ear export RECORDING --format euroc|rosbag1 --out PATH: a recording for other programs.
+// ear export RECORDING --format euroc|rosbag1|mcap --out PATH: a recording for other programs.
 #include <array>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <string>
 #include <system_error>
+#include <vector>
 
 #include "src/bag/bag.h"
 #include "src/recording/input_error.h"
 #include "src/recording/recording.h"
+#include "src/rosbag2/rosbag2.h"
 #include "tools/commands.h"
 #include "tools/evaluation/read.h"
 #include "tools/opened_recording.h"
@@ -85,12 +87,30 @@ void export_bag(const fs::path& mav0, const fs::path& out, const BagTopics& topi
   std::printf("%s: %zu samples; calibration: %s\n", out.c_str(), samples, calibration_folder(out, topics).c_str());
 }
 
+void export_mcap(const fs::path& mav0, const fs::path& out) {
+  RecordingOptions options;
+  options.accept_bad_calibration = true;  // the samples are what is asked for
+  Recording recording(mav0, options);
+  std::vector<TruePose> truth;
+  if (fs::exists(mav0 / "state_groundtruth_estimate0/data.csv")) {
+    for (const evaluation::Pose& pose : evaluation::read_truth(mav0))
+      truth.push_back({pose.t_ns, pose.q_WB, pose.p_WB});
+  }
+  Progress progress;
+  const std::size_t samples = write_mcap(
+      recording, out, mav0, truth, [&](std::size_t written) { progress.show(std::to_string(written) + " samples"); });
+  progress.finish();
+  std::printf("%s: %zu samples and the sensors' calibration\n", out.c_str(), samples);
+}
+
 void export_recording(const ExportArguments& args) {
   require_new(args.out);
-  const OpenedRecording opened(args.recording, args.config);
+  OpenedRecording opened(args.recording, args.config);
   const fs::path mav0 = find_mav0(opened.folder());
   if (args.format == "euroc") {
     export_euroc(mav0, args.out);
+  } else if (args.format == "mcap") {
+    export_mcap(mav0, args.out);
   } else {
     export_bag(mav0, args.out, args.config.empty() ? BagTopics{} : load_topics(args.config));
   }
@@ -101,10 +121,12 @@ void export_recording(const ExportArguments& args) {
 void add_export_command(CLI::App& app) {
   const auto args = std::make_shared<ExportArguments>();
   CLI::App* command = app.add_subcommand("export", "a recording for other programs (docs/bags.md)");
-  command->add_option("RECORDING", args->recording, "folder of the recording, or a ROS 1 bag")->required();
-  command->add_option("--format", args->format, "euroc: a folder with cameras, IMU and truth; rosbag1: a bag of all")
+  command->add_option("RECORDING", args->recording, "folder of the recording, or a bag of ROS 1 or 2")->required();
+  command
+      ->add_option("--format", args->format,
+                   "euroc: a folder with cameras, IMU and truth; rosbag1, mcap: a bag of all, of ROS 1 or ROS 2")
       ->required()
-      ->check(CLI::IsMember({"euroc", "rosbag1"}));
+      ->check(CLI::IsMember({"euroc", "rosbag1", "mcap"}));
   command->add_option("--out", args->out, "folder or bag to write; must not be there yet")->required();
   command->add_option("--config", args->config, "settings, of which the bag's topics count")->check(CLI::ExistingFile);
   command->callback([args] { export_recording(*args); });

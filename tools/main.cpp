@@ -26,6 +26,7 @@ int run_subcommand(int argc, char** argv) {
   CLI::App app{"ear: where a vehicle that drives and flies is, from cameras, IMU, wheels and lasers"};
   app.require_subcommand(1);
   ear::tools::add_run_command(app);
+  ear::tools::add_live_command(app);
   ear::tools::add_simulate_command(app);
   ear::tools::add_evaluate_command(app);
   ear::tools::add_check_command(app);

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "tools/blind_steps.h"
+#include "src/blind_steps.h"
 
 namespace ear::tools {
 namespace {

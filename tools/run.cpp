@@ -172,7 +172,7 @@ void run(const RunArguments& args) {
   options.camera_rate_hz = args.camera_rate_hz;
   options.mono = args.mono;
   const OpenedRecording opened(args.recording, args.config);
-  Recording recording(opened.folder(), options);
+  Recording recording = opened.read(options);
   if (const auto missing = check_sensors(recording.calibration())) {
     throw InputError(located(args.recording, 0, missing->where, missing->message));
   }
@@ -235,7 +235,7 @@ void add_run_command(CLI::App& app) {
   auto args = std::make_shared<RunArguments>();
   command
       ->add_option("RECORDING", args->recording,
-                   "Folder in the EuRoC/ASL layout (docs/recordings.md), or a ROS 1 bag (docs/bags.md)")
+                   "Folder in the EuRoC/ASL layout (docs/recordings.md), or a bag of ROS 1 or 2 (docs/bags.md)")
       ->required();
   command->add_option("--out", args->out, "Folder for estimate.tum, states.csv, summary.json, config.yaml")
       ->capture_default_str();

@@ -2,10 +2,13 @@
 
 #include <spdlog/details/os.h>
 #include <spdlog/sinks/basic_file_sink.h>
+#include <spdlog/sinks/rotating_file_sink.h>
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
+#include <sys/stat.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <memory>
 #include <stdexcept>
 
@@ -29,15 +32,51 @@ spdlog::level::level_enum level_of(LogLevel level) {
   return spdlog::level::err;
 }
 
+/// Is standard error the stream that systemd named in JOURNAL_STREAM, as "device:inode"?
+bool writes_to_journal() {
+  const char* const stream = std::getenv("JOURNAL_STREAM");
+  struct stat status {};
+  if (stream == nullptr || ::fstat(fileno(stderr), &status) != 0) return false;
+  return std::to_string(status.st_dev) + ":" + std::to_string(status.st_ino) == stream;
+}
+
+/// "<4>warning: text": the journal takes the number for the line's priority.
+class JournalFormatter final : public spdlog::formatter {
+ public:
+  void format(const spdlog::details::log_msg& message, spdlog::memory_buf_t& line) override {
+    const std::string_view level = priority(message.level);
+    line.append(level.data(), level.data() + level.size());
+    line.append(message.payload.begin(), message.payload.end());
+    line.push_back('\n');
+  }
+  [[nodiscard]] std::unique_ptr<spdlog::formatter> clone() const override {
+    return std::make_unique<JournalFormatter>();
+  }
+
+ private:
+  static std::string_view priority(spdlog::level::level_enum level) {
+    if (level >= spdlog::level::err) return "<3>";
+    if (level == spdlog::level::warn) return "<4>";
+    return level == spdlog::level::info ? "<6>" : "<7>";
+  }
+};
+
+spdlog::sink_ptr make_file_sink(const LogOptions& options) {
+  if (options.most_bytes == 0) return std::make_shared<spdlog::sinks::basic_file_sink_mt>(options.file.string());
+  return std::make_shared<spdlog::sinks::rotating_file_sink_mt>(options.file.string(), options.most_bytes,
+                                                                options.older_files);
+}
+
 std::shared_ptr<spdlog::logger> make_logger(const LogOptions& options) {
   const auto terminal = std::make_shared<spdlog::sinks::stderr_sink_mt>();
   const bool shows_progress = spdlog::details::os::in_terminal(stderr);
   terminal->set_pattern(std::string(shows_progress ? kClearLine : "") + "ear: %l: %v");
+  if (writes_to_journal()) terminal->set_formatter(std::make_unique<JournalFormatter>());
   terminal->set_level(level_of(options.level));
   auto logger = std::make_shared<spdlog::logger>(kName, terminal);
   logger->set_level(terminal->level());
   if (!options.file.empty()) {
-    const auto file = std::make_shared<spdlog::sinks::basic_file_sink_mt>(options.file.string());
+    const spdlog::sink_ptr file = make_file_sink(options);
     file->set_pattern("%Y-%m-%d %H:%M:%S.%e %l: %v");
     file->set_level(std::min(terminal->level(), spdlog::level::info));
     logger->sinks().push_back(file);

@@ -1,6 +1,7 @@
 // The log: warnings and events of src/ and of the ear program, for people. What a program acts on it gets as values.
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <string>
 
@@ -24,9 +25,12 @@ inline void log_error(const std::string& message) noexcept { log(LogLevel::error
 struct LogOptions {
   LogLevel level = LogLevel::warning;  ///< of standard error
   std::filesystem::path file;          ///< also here, with times, from level info on; empty: nowhere else
+  std::size_t most_bytes = 0;   ///< of the file: then it begins anew, and older ones are kept as file.1, ...; 0: any
+  std::size_t older_files = 3;  ///< so many
 };
 
-/// Makes the logger "ear" anew. Throws std::runtime_error, naming the file, if that cannot be written.
+/// Makes the logger "ear" anew. Where standard error goes to systemd's journal, lines begin with the level as it reads
+/// it (sd-daemon(3)). Throws std::runtime_error, naming the file, if that cannot be written.
 void set_up_log(const LogOptions& options);
 
 }  // namespace ear

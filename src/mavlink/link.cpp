@@ -9,6 +9,7 @@ namespace {
 
 using SteadyClock = std::chrono::steady_clock;
 constexpr std::chrono::milliseconds kHeartbeatInterval{1000};
+constexpr std::chrono::milliseconds kQuestionInterval{100};
 constexpr int kPatienceMs = 50;  // how long the thread waits for bytes before it looks at the time
 
 }  // namespace
@@ -22,8 +23,10 @@ std::optional<TimeSync> answer_to(const Packet& packet, const Sender& self, Time
   return TimeSync{std::max<TimeNs>(now_ns, 1), request->ts1, packet.sender.system, packet.sender.component};
 }
 
-Link::Link(const std::string& address, const Sender& sender, std::function<TimeNs()> clock)
-    : transport_(address), sender_(sender), clock_(std::move(clock)), thread_([this] { converse(); }) {}
+Link::Link(const std::string& address, const Sender& sender, std::function<TimeNs()> clock, LinkListener listener)
+    : transport_(address), sender_(sender), clock_(std::move(clock)), listener_(std::move(listener)), thread_([this] {
+        converse();
+      }) {}
 
 Link::~Link() {
   stop_ = true;
@@ -57,18 +60,31 @@ void Link::answer(const Packet& request) {
   if (reply && send(to_payload(*reply))) ++counts_.time_answers;
 }
 
+void Link::ask_time() {
+  const std::lock_guard lock(mutex_);
+  send(to_payload(TimeSync{0, clock_(), 0, 0}));
+}
+
 void Link::converse() {
   Parser parser;
   std::array<std::uint8_t, 1024> bytes{};
   SteadyClock::time_point next_heartbeat = SteadyClock::now();
+  SteadyClock::time_point next_question = next_heartbeat;
   while (!stop_) {
     if (SteadyClock::now() >= next_heartbeat) {
       const std::lock_guard lock(mutex_);
       send(to_payload(Heartbeat{state_}));
       next_heartbeat += kHeartbeatInterval;
     }
+    if (listener_.asks_time && SteadyClock::now() >= next_question) {
+      ask_time();
+      next_question = SteadyClock::now() + kQuestionInterval;
+    }
     const std::size_t count = transport_.receive(bytes.data(), bytes.size(), kPatienceMs);
-    for (const Packet& packet : parser.add(bytes.data(), count)) answer(packet);
+    for (const Packet& packet : parser.add(bytes.data(), count)) {
+      answer(packet);
+      if (listener_.on_packet) listener_.on_packet(packet);
+    }
   }
 }
 

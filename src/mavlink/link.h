@@ -24,11 +24,17 @@ struct LinkCounts {
   std::uint64_t dropped = 0;       ///< messages that the line did not take, or that nothing was there to receive
 };
 
+/// What else a link does with what it hears; called by its thread.
+struct LinkListener {
+  std::function<void(const Packet&)> on_packet;  ///< each packet that came, after answers to it were sent
+  bool asks_time = false;                        ///< sends a TIMESYNC request ten times a second
+};
+
 class Link {
  public:
   /// Opens `address` (see Transport) and begins. `clock` gives the time that ODOMETRY is stamped with, now [ns]; it is
   /// called from the thread.
-  Link(const std::string& address, const Sender& sender, std::function<TimeNs()> clock);
+  Link(const std::string& address, const Sender& sender, std::function<TimeNs()> clock, LinkListener listener = {});
   ~Link();
   Link(const Link&) = delete;
   Link& operator=(const Link&) = delete;
@@ -47,11 +53,13 @@ class Link {
  private:
   bool send(const Payload& payload);  ///< mutex_ is held: packets of two threads must not mix
   void answer(const Packet& request);
+  void ask_time();
   void converse();
 
   Transport transport_;
   Sender sender_;
   std::function<TimeNs()> clock_;
+  LinkListener listener_;
   std::atomic<SystemState> state_ = SystemState::calibrating;
   std::atomic<bool> stop_ = false;
 

@@ -1,6 +1,6 @@
-// The few MAVLink messages that this project sends or reads, and their payloads. Fields, their order on the wire and
-// the numbers are those of MAVLink's common.xml (https://mavlink.io/en/messages/common.html). docs/mavlink.md has the
-// reasons.
+// The few MAVLink messages that this project sends or reads, and their payloads: own words out, sensors in. Fields,
+// their order on the wire and the numbers are those of MAVLink's common.xml
+// (https://mavlink.io/en/messages/common.html). docs/mavlink.md has the reasons.
 #pragma once
 
 #include <Eigen/Core>
@@ -24,7 +24,11 @@ struct MessageType {
 
 inline constexpr MessageType kHeartbeatType{0, 50, 9};
 inline constexpr MessageType kTimeSyncType{111, 34, 18};
+inline constexpr MessageType kScaledImuType{26, 170, 24};
+inline constexpr MessageType kHighresImuType{105, 93, 63};
+inline constexpr MessageType kDistanceSensorType{132, 85, 39};
 inline constexpr MessageType kStatusTextType{253, 83, 54};
+inline constexpr MessageType kWheelDistanceType{9000, 113, 137};
 inline constexpr MessageType kOdometryType{331, 91, 233};
 
 /// The bytes of one message, zeros at its end included.
@@ -73,12 +77,50 @@ struct OdometryMessage {
   std::int8_t quality = 0;                          ///< -1: failed, 0: unknown, 1 ... 100 [%]
 };
 
+/// What a flight controller's IMU measures, in SI: HIGHRES_IMU, or SCALED_IMU with its coarser steps. Axes as sent.
+struct ImuMessage {
+  std::int64_t time_us = 0;                         ///< since the sender started, or since 1970
+  Eigen::Vector3d accel = Eigen::Vector3d::Zero();  ///< [m/s^2]
+  Eigen::Vector3d gyro = Eigen::Vector3d::Zero();   ///< [rad/s]
+  std::uint8_t id = 0;                              ///< of HIGHRES_IMU
+};
+
+/// WHEEL_DISTANCE: what each wheel rolled since the start.
+struct WheelDistance {
+  static constexpr std::size_t kMost = 16;
+  std::int64_t time_us = 0;
+  std::array<double, kMost> distance{};  ///< [m] forward is positive
+  std::uint8_t count = 0;                ///< wheels
+};
+
+/// DISTANCE_SENSOR, in metres.
+struct DistanceSensor {
+  std::int64_t time_ms = 0;  ///< since the sender started
+  double distance = 0.0;     ///< [m]
+  double least = 0.0;        ///< [m] that it measures
+  double most = 0.0;         ///< [m]
+  std::uint8_t id = 0;
+  std::uint8_t signal_quality = 0;  ///< 1: no return; 0: not told
+};
+
 [[nodiscard]] Payload to_payload(const Heartbeat& message);
 [[nodiscard]] Payload to_payload(const TimeSync& message);
 [[nodiscard]] Payload to_payload(const StatusText& message);
 [[nodiscard]] Payload to_payload(const OdometryMessage& message);
 
-/// The TIMESYNC in a payload; nothing if it is another message.
+/// As HIGHRES_IMU.
+[[nodiscard]] Payload to_payload(const ImuMessage& message);
+[[nodiscard]] Payload to_payload(const WheelDistance& message);
+[[nodiscard]] Payload to_payload(const DistanceSensor& message);
+
+/// HIGHRES_IMU.
+[[nodiscard]] std::optional<ImuMessage> to_highres_imu(const Payload& payload);
+/// SCALED_IMU: milli-g and mrad/s to SI.
+[[nodiscard]] std::optional<ImuMessage> to_scaled_imu(const Payload& payload);
+[[nodiscard]] std::optional<WheelDistance> to_wheel_distance(const Payload& payload);
+[[nodiscard]] std::optional<DistanceSensor> to_distance_sensor(const Payload& payload);
+
+/// The TIMESYNC in a payload; as the four above, nothing if it is another message.
 [[nodiscard]] std::optional<TimeSync> to_time_sync(const Payload& payload);
 
 }  // namespace ear::mavlink

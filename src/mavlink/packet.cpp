@@ -13,7 +13,9 @@ constexpr std::size_t kChecksumSize = 2;
 constexpr std::size_t kSignatureSize = 13;
 constexpr std::uint8_t kSignedFlag = 0x01;
 
-constexpr std::array<MessageType, 4> kTypes = {kHeartbeatType, kTimeSyncType, kStatusTextType, kOdometryType};
+constexpr std::array<MessageType, 8> kTypes = {kHeartbeatType, kScaledImuType,      kHighresImuType,
+                                               kTimeSyncType,  kDistanceSensorType, kStatusTextType,
+                                               kOdometryType,  kWheelDistanceType};
 
 std::optional<MessageType> find_type(std::uint32_t id) {
   for (const MessageType& type : kTypes) {

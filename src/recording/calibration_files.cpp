@@ -229,7 +229,8 @@ void express_in_imu_frame(const Eigen::Isometry3d& T_FB, Calibration& calibratio
 
 }  // namespace
 
-Calibration load_calibration(const fs::path& mav0, const std::vector<fs::path>& kalibr_files, Warnings& warnings) {
+Calibration load_calibration(const fs::path& mav0, const std::vector<fs::path>& kalibr_files, Warnings& warnings,
+                             CalibrationKind kind) {
   Calibration calibration;
   const std::size_t cameras = count_cameras(mav0);
   if (!has_camchain(kalibr_files)) read_cameras(mav0, calibration);
@@ -237,7 +238,10 @@ Calibration load_calibration(const fs::path& mav0, const std::vector<fs::path>& 
   if (has_sensor(mav0, "laser0")) calibration.lasers = read_lasers(mav0 / "laser0" / "sensor.yaml");
 
   const fs::path imu_file = mav0 / "imu0" / "sensor.yaml";
-  if (fs::exists(imu_file) || kalibr_files.empty()) {
+  if (kind == CalibrationKind::alone && !fs::exists(imu_file) && kalibr_files.empty()) {
+    warnings.add("calibration: imu0",
+                 located(imu_file, 0, "", "does not exist: noise of a typical small IMU is assumed"));
+  } else if (fs::exists(imu_file) || kalibr_files.empty()) {
     const Eigen::Isometry3d T_FB = read_imu(imu_file, calibration.imu);
     if (!T_FB.isApprox(Eigen::Isometry3d::Identity(), 1e-6)) {
       express_in_imu_frame(T_FB, calibration);
@@ -248,7 +252,9 @@ Calibration load_calibration(const fs::path& mav0, const std::vector<fs::path>& 
   // Kalibr's cameras are already relative to the IMU.
   for (const fs::path& file : kalibr_files) read_kalibr_file(file, calibration);
 
-  calibration.cameras.resize(std::min(calibration.cameras.size(), cameras));
+  if (kind == CalibrationKind::recording) {
+    calibration.cameras.resize(std::min(calibration.cameras.size(), cameras));
+  }
   return calibration;
 }
 

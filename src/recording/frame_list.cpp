@@ -1,7 +1,5 @@
 #include "src/recording/frame_list.h"
 
-#include <algorithm>
-#include <cmath>
 #include <utility>
 
 namespace ear {
@@ -17,7 +15,7 @@ std::filesystem::path csv_of(const std::filesystem::path& mav0, const char* came
 }  // namespace
 
 FrameList::FrameList(const std::filesystem::path& mav0, bool stereo, double camera_rate_hz)
-    : mav0_(mav0), left_(csv_of(mav0, "cam0"), "cam0", parse_image_row), camera_rate_hz_(camera_rate_hz) {
+    : mav0_(mav0), left_(csv_of(mav0, "cam0"), "cam0", parse_image_row), rate_(camera_rate_hz) {
   if (stereo) right_ = std::make_unique<SampleStream<ImageRow>>(csv_of(mav0, "cam1"), "cam1", parse_image_row);
   const std::filesystem::path arrivals = mav0 / "cam0" / "arrival.csv";
   if (std::filesystem::exists(arrivals)) {
@@ -27,7 +25,7 @@ FrameList::FrameList(const std::filesystem::path& mav0, bool stereo, double came
 
 std::optional<FrameFiles> FrameList::next(Warnings& warnings) {
   while (std::optional<FrameFiles> frame = next_pair(warnings)) {
-    if (due(frame->t_ns)) return frame;
+    if (rate_.due(frame->t_ns)) return frame;
   }
   return std::nullopt;
 }
@@ -67,19 +65,6 @@ TimeNs FrameList::arrival_of(TimeNs t_ns, Warnings& warnings) {
     }
   }
   return arrival_ahead_->t_ns == t_ns ? arrival_ahead_->arrival_ns : t_ns;
-}
-
-// Time is cut into slots of one wanted period, and the frame nearest to the beginning of each slot is used: half an
-// interval before it is early enough, so that stamps may tremble.
-bool FrameList::due(TimeNs t_ns) {
-  if (camera_rate_hz_ <= 0.0) return true;
-  if (!first_ns_) first_ns_ = t_ns;
-  const double interval = seconds_between(std::exchange(last_ns_, t_ns).value_or(t_ns), t_ns);
-  const double early = std::min(0.5 * interval * camera_rate_hz_, 0.5);  // in slots; 0.5 after a gap
-  const auto slot = static_cast<std::int64_t>(std::floor(seconds_between(*first_ns_, t_ns) * camera_rate_hz_ + early));
-  if (last_slot_ && slot <= *last_slot_) return false;
-  last_slot_ = slot;
-  return true;
 }
 
 }  // namespace ear

@@ -1,11 +1,11 @@
 // Which images belong together: the rows of one or two cameras, associated by time.
 #pragma once
 
-#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <optional>
 
+#include "src/recording/frame_images.h"
 #include "src/recording/rows.h"
 #include "src/recording/sample_stream.h"
 #include "src/recording/warnings.h"
@@ -34,7 +34,6 @@ class FrameList {
   [[nodiscard]] std::optional<FrameFiles> next_pair(Warnings& warnings);
   [[nodiscard]] std::filesystem::path matching_right(TimeNs t_ns, Warnings& warnings);
   [[nodiscard]] TimeNs arrival_of(TimeNs t_ns, Warnings& warnings);
-  [[nodiscard]] bool due(TimeNs t_ns);
 
   std::filesystem::path mav0_;
   SampleStream<ImageRow> left_;
@@ -42,10 +41,7 @@ class FrameList {
   std::optional<ImageRow> right_ahead_;
   std::unique_ptr<SampleStream<ArrivalRow>> arrivals_;
   std::optional<ArrivalRow> arrival_ahead_;
-  double camera_rate_hz_;
-  std::optional<TimeNs> first_ns_;
-  std::optional<TimeNs> last_ns_;
-  std::optional<std::int64_t> last_slot_;
+  FrameRate rate_;
 };
 
 }  // namespace ear

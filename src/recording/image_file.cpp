@@ -12,13 +12,13 @@
 namespace ear {
 namespace {
 
-std::vector<char> read_bytes(const std::filesystem::path& file) {
+std::vector<std::uint8_t> read_bytes(const std::filesystem::path& file) {
   if (!std::filesystem::is_regular_file(file)) return {};
   std::ifstream stream(file, std::ios::binary | std::ios::ate);
   if (!stream) return {};
-  std::vector<char> bytes(static_cast<std::size_t>(stream.tellg()));
+  std::vector<std::uint8_t> bytes(static_cast<std::size_t>(stream.tellg()));
   stream.seekg(0);
-  stream.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  stream.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
   return bytes;
 }
 
@@ -31,8 +31,8 @@ bool cut_off(std::string_view bytes) {
   return false;
 }
 
-cv::Mat decoded(const std::vector<char>& bytes) {
-  if (bytes.empty() || cut_off({bytes.data(), bytes.size()})) return {};
+cv::Mat decoded(const std::vector<std::uint8_t>& bytes) {
+  if (bytes.empty() || cut_off({reinterpret_cast<const char*>(bytes.data()), bytes.size()})) return {};
   try {
     return cv::imdecode(bytes, cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH);
   } catch (const cv::Exception&) {  // absurd sizes in the header, for example
@@ -43,18 +43,22 @@ cv::Mat decoded(const std::vector<char>& bytes) {
 }  // namespace
 
 cv::Mat read_image(const std::filesystem::path& file, const std::string& camera, Warnings& warnings) {
-  const std::vector<char> bytes = read_bytes(file);
+  return grey_image(read_bytes(file), file, camera, warnings);
+}
+
+cv::Mat grey_image(const std::vector<std::uint8_t>& bytes, const std::filesystem::path& where,
+                   const std::string& camera, Warnings& warnings) {
   cv::Mat image = decoded(bytes);
   if (image.empty()) {
     const char* const reason = bytes.empty() ? "missing or empty" : "no image, or cut off";
-    warnings.add(camera + ": unreadable image", located(file, 0, "", reason));
+    warnings.add(camera + ": unreadable image", located(where, 0, "", reason));
     return {};
   }
   if (image.depth() == CV_16U) {
-    warnings.add(camera + ": 16-bit image scaled down to 8 bits", located(file, 0, "", "the upper 8 bits are used"));
+    warnings.add(camera + ": 16-bit image scaled down to 8 bits", located(where, 0, "", "the upper 8 bits are used"));
     image.convertTo(image, CV_8U, 1.0 / 256.0);
   } else if (image.depth() != CV_8U) {
-    warnings.add(camera + ": unreadable image", located(file, 0, "", "neither 8 nor 16 bits per pixel"));
+    warnings.add(camera + ": unreadable image", located(where, 0, "", "neither 8 nor 16 bits per pixel"));
     return {};
   }
   return image;

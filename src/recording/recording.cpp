@@ -1,117 +1,35 @@
 #include "src/recording/recording.h"
 
 #include <array>
-#include <opencv2/core/mat.hpp>
 #include <string>
 #include <utility>
 
 #include "src/log/log.h"
 #include "src/recording/calibration_files.h"
-#include "src/recording/frame_list.h"
-#include "src/recording/image_file.h"
-#include "src/recording/rows.h"
-#include "src/recording/sample_stream.h"
+#include "src/recording/folder_source.h"
 
 namespace ear {
 namespace {
 
 namespace fs = std::filesystem;
 
-ImageView view_of(const cv::Mat& image) {
-  if (image.empty()) return {};
-  return {image.data, image.cols, image.rows, static_cast<std::ptrdiff_t>(image.step[0])};
-}
-
-RecordedFrame make_frame(const FrameFiles& files, std::array<cv::Mat, 2> images) {
-  auto pixels = std::make_shared<const std::array<cv::Mat, 2>>(std::move(images));
-  RecordedFrame frame;
-  frame.t_ns = files.t_ns;
-  frame.arrival_ns = files.arrival_ns;
-  frame.left = view_of((*pixels)[0]);
-  frame.right = view_of((*pixels)[1]);
-  frame.pixels = std::move(pixels);
-  return frame;
-}
-
-std::string size_text(int width, int height) { return std::to_string(width) + "x" + std::to_string(height); }
-
-// Turns the rows of the cameras into frames. Lives on the background thread.
-class FrameDecoder {
- public:
-  FrameDecoder(const fs::path& mav0, std::vector<CameraCalibration> cameras, const RecordingOptions& options)
-      : files_(mav0, cameras.size() == 2, options.camera_rate_hz),
-        cameras_(std::move(cameras)),
-        any_size_(options.accept_bad_calibration) {}
-
-  // The next frame that has a left image.
-  DecodedFrame operator()() {
-    DecodedFrame decoded;
-    while (const std::optional<FrameFiles> files = files_.next(decoded.warnings)) {
-      std::array<cv::Mat, 2> images{read(files->left, 0, decoded.warnings), {}};
-      if (!files->right.empty()) images[1] = read(files->right, 1, decoded.warnings);
-      if (images[0].empty()) continue;
-      decoded.frame = make_frame(*files, std::move(images));
-      break;
-    }
-    return decoded;
-  }
-
- private:
-  // An image, empty if it cannot be used. A camera whose first image does not fit its calibration is unusable.
-  cv::Mat read(const fs::path& file, std::size_t index, Warnings& warnings) {
-    const std::string name = "cam" + std::to_string(index);
-    cv::Mat image = read_image(file, name, warnings);
-    if (image.empty()) return image;
-    const CameraCalibration& camera = cameras_[index];
-    const bool first = !std::exchange(seen_[index], true);
-    if (image.cols == camera.width && image.rows == camera.height) return image;
-
-    const std::string where = located(
-        file, 0, "resolution",
-        size_text(image.cols, image.rows) + " px, but the calibration says " + size_text(camera.width, camera.height));
-    if (first && !any_size_) throw InputError(where);
-    warnings.add(name + ": image size differs from calibration", where);
-    return any_size_ ? image : cv::Mat();
-  }
-
-  FrameList files_;
-  std::vector<CameraCalibration> cameras_;
-  bool any_size_;
-  std::array<bool, 2> seen_{};
-};
-
-void require_usable(const Calibration& calibration, const fs::path& mav0, bool accept_errors, Warnings& warnings) {
+void require_usable(const Calibration& calibration, const fs::path& place, bool accept_errors, Warnings& warnings) {
   for (const Finding& finding : check_calibration(calibration)) {
-    const std::string where = located(mav0, 0, finding.where, finding.message);
+    const std::string where = located(place, 0, finding.where, finding.message);
     if (finding.severity == Severity::error && !accept_errors) throw InputError(where);
     warnings.add("calibration: " + finding.where, where);
   }
-}
-
-TimeSpan span_of(const fs::path& csv) {
-  Warnings ignored;  // the reading itself will report them
-  const auto first = SampleStream<ImuSample>(csv, "imu0", parse_imu_row).next(ignored);
-  if (!first) throw InputError(located(csv, 0, "", "no inertial sample that could be used"));
-  return {first->t_ns, last_stamp(csv).value_or(first->t_ns)};
 }
 
 }  // namespace
 
 class Recording::Impl {
  public:
-  Impl(const fs::path& folder, const RecordingOptions& options)
-      : mav0_(find_mav0(folder)),
-        calibration_(usable_calibration(options)),
-        span_(span_of(mav0_ / "imu0" / "data.csv")),
-        imu_(mav0_ / "imu0" / "data.csv", "imu0", parse_imu_row) {
-    if (calibration_.encoder) encoder_.emplace(mav0_ / "encoder0" / "data.csv", "encoder0", parse_encoder_row);
-    if (calibration_.lasers) {
-      laser_.emplace(mav0_ / "laser0" / "data.csv", "laser0",
-                     [lasers = *calibration_.lasers](const CsvRow& row) { return parse_laser_row(row, lasers); });
-    }
+  Impl(std::unique_ptr<SampleSource> source, const RecordingOptions& options)
+      : source_(std::move(source)), calibration_(usable_calibration(options)), span_(source_->span()) {
+    source_->open(calibration_);
     if (!calibration_.cameras.empty()) {
-      auto decoder = std::make_shared<FrameDecoder>(mav0_, calibration_.cameras, options);
-      frames_ = std::make_unique<FrameQueue>([decoder] { return (*decoder)(); });
+      frames_ = std::make_unique<FrameQueue>([this] { return source_->next_frame(); });
     }
     refill_imu();
     refill_encoder();
@@ -148,9 +66,9 @@ class Recording::Impl {
 
  private:
   Calibration usable_calibration(const RecordingOptions& options) {
-    Calibration calibration = load_calibration(mav0_, options.calibration_files, warnings_);
+    Calibration calibration = source_->calibration(warnings_);
     if (options.mono && calibration.cameras.size() > 1) calibration.cameras.resize(1);
-    require_usable(calibration, mav0_, options.accept_bad_calibration, warnings_);
+    require_usable(calibration, source_->path(), options.accept_bad_calibration, warnings_);
     return calibration;
   }
 
@@ -174,13 +92,9 @@ class Recording::Impl {
     return taken;
   }
 
-  void refill_imu() { next_imu_ = imu_.next(warnings_); }
-  void refill_encoder() {
-    if (encoder_) next_encoder_ = encoder_->next(warnings_);
-  }
-  void refill_laser() {
-    if (laser_) next_laser_ = laser_->next(warnings_);
-  }
+  void refill_imu() { next_imu_ = source_->next_imu(warnings_); }
+  void refill_encoder() { next_encoder_ = source_->next_encoder(warnings_); }
+  void refill_laser() { next_laser_ = source_->next_laser(warnings_); }
   void refill_frame() {
     if (!frames_) return;
     DecodedFrame decoded = frames_->pop();
@@ -190,13 +104,10 @@ class Recording::Impl {
 
   Warnings warnings_;
   std::size_t logged_ = 0;  // kinds of them
-  fs::path mav0_;
+  std::unique_ptr<SampleSource> source_;
   Calibration calibration_;
   TimeSpan span_;
-  SampleStream<ImuSample> imu_;
-  std::optional<SampleStream<EncoderSample>> encoder_;
-  std::optional<SampleStream<LaserSample>> laser_;
-  std::unique_ptr<FrameQueue> frames_;
+  std::unique_ptr<FrameQueue> frames_;  // after the source, which its thread uses
   std::optional<ImuSample> next_imu_;
   std::optional<EncoderSample> next_encoder_;
   std::optional<LaserSample> next_laser_;
@@ -204,7 +115,9 @@ class Recording::Impl {
 };
 
 Recording::Recording(const fs::path& folder, const RecordingOptions& options)
-    : impl_(std::make_unique<Impl>(folder, options)) {}
+    : Recording(open_folder(folder, options), options) {}
+Recording::Recording(std::unique_ptr<SampleSource> source, const RecordingOptions& options)
+    : impl_(std::make_unique<Impl>(std::move(source), options)) {}
 Recording::~Recording() = default;
 Recording::Recording(Recording&&) noexcept = default;
 Recording& Recording::operator=(Recording&&) noexcept = default;

@@ -12,6 +12,7 @@
 #include "ear/types.h"
 #include "src/recording/frame_queue.h"
 #include "src/recording/input_error.h"
+#include "src/recording/sample_source.h"
 #include "src/recording/warnings.h"
 
 namespace ear {
@@ -27,19 +28,6 @@ struct Overloaded : Lambdas... {
 template <typename... Lambdas>
 Overloaded(Lambdas...) -> Overloaded<Lambdas...>;
 
-struct RecordingOptions {
-  std::vector<std::filesystem::path> calibration_files;  ///< Kalibr's camchain and imu.yaml; see load_calibration()
-  double camera_rate_hz = 0.0;                           ///< frames are left out to reach this lower rate; 0: all
-  bool mono = false;                                     ///< ignore the right camera
-  bool accept_bad_calibration = false;  ///< read on although the calibration cannot be right, to report on the rest
-};
-
-/// First and last stamp of the IMU.
-struct TimeSpan {
-  TimeNs first_ns = 0;
-  TimeNs last_ns = 0;
-};
-
 /// Streams a recording from disk in constant memory; images are decoded ahead on one background thread. The output does
 /// not depend on the timing of that thread.
 class Recording {
@@ -47,6 +35,8 @@ class Recording {
   /// `folder` is RECORDING or RECORDING/mav0. Throws InputError if there is no IMU, or a file that is there cannot be
   /// used. Whatever the recording survives is counted in warnings().
   explicit Recording(const std::filesystem::path& folder, const RecordingOptions& options = {});
+  /// Of another source, a bag for example.
+  Recording(std::unique_ptr<SampleSource> source, const RecordingOptions& options);
   ~Recording();
   Recording(Recording&&) noexcept;
   Recording& operator=(Recording&&) noexcept;

@@ -25,12 +25,13 @@ std::string text(double value) {
 
 class Check {
  public:
-  RecordingReport run(const std::filesystem::path& folder, const std::vector<std::filesystem::path>& files) {
+  RecordingReport run(const std::function<Recording(const RecordingOptions&)>& open,
+                      const std::vector<std::filesystem::path>& files) {
     try {
       RecordingOptions options;
       options.calibration_files = files;
       options.accept_bad_calibration = true;
-      Recording recording(folder, options);
+      Recording recording = open(options);
       report_.calibration = recording.calibration();
       report_.findings = check_calibration(recording.calibration());
       if (const auto missing = check_sensors(recording.calibration())) report_.findings.push_back(*missing);
@@ -163,7 +164,13 @@ bool RecordingReport::usable() const {
 
 RecordingReport check_recording(const std::filesystem::path& folder,
                                 const std::vector<std::filesystem::path>& calibration_files) {
-  return Check().run(folder, calibration_files);
+  return check_recording([&](const RecordingOptions& options) { return Recording(folder, options); },
+                         calibration_files);
+}
+
+RecordingReport check_recording(const std::function<Recording(const RecordingOptions&)>& open,
+                                const std::vector<std::filesystem::path>& calibration_files) {
+  return Check().run(open, calibration_files);
 }
 
 }  // namespace ear

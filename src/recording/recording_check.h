@@ -2,12 +2,14 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "src/recording/calibration_files.h"
 #include "src/recording/imu_check.h"
+#include "src/recording/recording.h"
 #include "src/recording/stream_timing.h"
 #include "src/recording/warnings.h"
 
@@ -36,6 +38,10 @@ struct RecordingReport {
 /// Reads everything. What makes the recording unusable is a finding, not an exception.
 /// `calibration_files`: see load_calibration().
 [[nodiscard]] RecordingReport check_recording(const std::filesystem::path& folder,
+                                              const std::vector<std::filesystem::path>& calibration_files);
+
+/// The same of what `open` opens, a bag for example.
+[[nodiscard]] RecordingReport check_recording(const std::function<Recording(const RecordingOptions&)>& open,
                                               const std::vector<std::filesystem::path>& calibration_files);
 
 }  // namespace ear

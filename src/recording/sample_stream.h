@@ -10,6 +10,7 @@
 #include "ear/types.h"
 #include "src/recording/csv.h"
 #include "src/recording/input_error.h"
+#include "src/recording/sample_order.h"
 #include "src/recording/warnings.h"
 
 namespace ear {
@@ -33,42 +34,17 @@ class SampleStream {
 
   /// `name` ("imu0") begins the kind of every warning.
   SampleStream(const std::filesystem::path& file, std::string name, ParseRow parse_row)
-      : csv_(file), name_(std::move(name)), parse_row_(std::move(parse_row)) {}
+      : csv_(file), name_(std::move(name)), parse_row_(std::move(parse_row)), order_(file, name_) {}
 
   /// The next good sample, or nothing at the end of the file. Throws InputError (see above).
   [[nodiscard]] std::optional<Sample> next(Warnings& warnings) {
-    if (!ahead_) ahead_ = read(warnings);
-    while (ahead_) {
-      Numbered current = std::move(*ahead_);
-      ahead_ = read(warnings);
-      if (!in_order(current, warnings)) continue;
-      last_ns_ = current.sample.t_ns;
-      return std::move(current.sample);
-    }
-    return std::nullopt;
+    return order_.next([this](Warnings& w) { return read(w); }, warnings);
   }
 
   [[nodiscard]] const std::filesystem::path& file() const { return csv_.file(); }
 
  private:
-  struct Numbered {
-    Sample sample;
-    std::size_t line;
-  };
-
-  bool in_order(const Numbered& current, Warnings& warnings) const {
-    const TimeNs t = current.sample.t_ns;
-    const auto drop = [&](const char* kind, const std::string& message) {
-      warnings.add(name_ + ": " + kind, located(csv_.file(), current.line, "timestamp", message));
-      return false;
-    };
-    if (last_ns_ && t == *last_ns_) return drop("duplicate stamp", "the same as in the row before");
-    if (last_ns_ && t < *last_ns_) return drop("backward stamp", "earlier than the row before");
-    // One stamp that is far too late must not make all that follow it look late: believe the rows on both its sides.
-    const bool ahead_fits = ahead_ && (!last_ns_ || ahead_->sample.t_ns > *last_ns_);
-    if (ahead_fits && ahead_->sample.t_ns < t) return drop("backward stamp", "later than the row after it");
-    return true;
-  }
+  using Numbered = typename SampleOrder<Sample>::Numbered;
 
   std::optional<Numbered> read(Warnings& warnings) {
     while (const CsvRow* row = csv_.next()) {
@@ -104,8 +80,7 @@ class SampleStream {
   CsvReader csv_;
   std::string name_;
   ParseRow parse_row_;
-  std::optional<Numbered> ahead_;
-  std::optional<TimeNs> last_ns_;
+  SampleOrder<Sample> order_;
   std::size_t columns_ = 0;  // of the first row; all others must agree
 };
 

@@ -72,6 +72,14 @@ std::vector<double> YamlMap::numbers(const std::string& key, std::size_t size) c
   return values;
 }
 
+std::vector<std::string> YamlMap::texts(const std::string& key) const {
+  const YAML::Node list = required(key);
+  if (!list.IsSequence()) throw error_at(list, key, "a list of texts expected");
+  std::vector<std::string> values;
+  for (const YAML::Node& item : list) values.push_back(convert<std::string>(item, key));
+  return values;
+}
+
 Eigen::Vector3d YamlMap::vector3(const std::string& key) const {
   const std::vector<double> v = numbers(key, 3);
   return {v[0], v[1], v[2]};

@@ -44,6 +44,9 @@ class YamlMap {
   /// A list of finite numbers; `size` 0 accepts any length.
   [[nodiscard]] std::vector<double> numbers(const std::string& key, std::size_t size) const;
 
+  /// A list of texts.
+  [[nodiscard]] std::vector<std::string> texts(const std::string& key) const;
+
   /// A 3-vector.
   [[nodiscard]] Eigen::Vector3d vector3(const std::string& key) const;
 

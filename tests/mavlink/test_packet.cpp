@@ -26,7 +26,7 @@ std::map<std::string, Bytes> reference_packets() {
   std::ifstream file(EAR_SOURCE_DIR "/tests/mavlink/reference_packets.txt");
   std::map<std::string, Bytes> packets;
   for (std::string name, hex; file >> name >> hex;) packets[name] = from_hex(hex);
-  REQUIRE(packets.size() == 5);
+  REQUIRE(packets.size() == 9);
   return packets;
 }
 
@@ -136,6 +136,57 @@ TEST_CASE("mavlink parser: any changed bit is noticed") {
       CHECK(parse(bad).empty());
     }
   }
+}
+
+TEST_CASE("mavlink: sensors that another implementation sent") {
+  const std::map<std::string, Bytes> reference = reference_packets();
+  const auto payload_of = [&](const std::string& name) {
+    const Bytes& bytes = reference.at(name);
+    const std::vector<Packet> packets = Parser{}.add(bytes.data(), bytes.size());
+    REQUIRE(packets.size() == 1);
+    return packets[0].payload;
+  };
+  const auto imu = to_highres_imu(payload_of("highres_imu"));
+  REQUIRE(imu);
+  CHECK(imu->time_us == 1'234'567'890'123);
+  CHECK(imu->accel == Eigen::Vector3d(1.5, -2.25, 9.75));
+  CHECK(imu->gyro == Eigen::Vector3d(0.125, -0.5, 3.0));
+  CHECK(imu->id == 2);
+
+  const auto scaled = to_scaled_imu(payload_of("scaled_imu"));
+  REQUIRE(scaled);
+  CHECK(scaled->time_us == 4'000'000'001'000);
+  CHECK(scaled->accel.isApprox(9.80665 * Eigen::Vector3d(1.0, -0.5, -1.0), 1e-12));
+  CHECK(scaled->gyro.isApprox(Eigen::Vector3d(1.5, -0.002, 0.003), 1e-12));
+
+  const auto wheels = to_wheel_distance(payload_of("wheel_distance"));
+  REQUIRE(wheels);
+  CHECK(wheels->time_us == 1'234'567'890'123);
+  CHECK(wheels->count == 2);
+  CHECK(wheels->distance[0] == 12.375);
+  CHECK(wheels->distance[1] == -0.015625);
+
+  const auto range = to_distance_sensor(payload_of("distance_sensor"));
+  REQUIRE(range);
+  CHECK(range->time_ms == 4'000'000'001);
+  CHECK(range->distance == doctest::Approx(0.37));
+  CHECK(range->most == doctest::Approx(4.0));
+  CHECK(range->id == 7);
+  CHECK(range->signal_quality == 55);
+  CHECK_FALSE(to_highres_imu(payload_of("scaled_imu")));
+}
+
+TEST_CASE("mavlink: sensors come back as they were sent") {
+  const ImuMessage imu{77, {1.0, 2.0, -9.5}, {0.25, -0.5, 4.0}, 1};
+  CHECK(to_highres_imu(to_payload(imu))->accel == imu.accel);
+  CHECK(to_highres_imu(to_payload(imu))->gyro == imu.gyro);
+  CHECK(to_highres_imu(to_payload(imu))->id == 1);
+  WheelDistance wheels{88, {}, 2};
+  wheels.distance[1] = -1e6;
+  CHECK(to_wheel_distance(to_payload(wheels))->distance == wheels.distance);
+  const DistanceSensor range{99, 0.5, 0.02, 4.0, 3, 9};
+  CHECK(to_distance_sensor(to_payload(range))->distance == doctest::Approx(0.5));
+  CHECK(to_distance_sensor(to_payload(range))->id == 3);
 }
 
 TEST_CASE("mavlink parser: other messages and signatures are passed over") {

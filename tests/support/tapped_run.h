@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "filter/filter.h"
-#include "tools/blind_steps.h"
+#include "src/blind_steps.h"
 #include "tools/simulator/simulation.h"
 
 namespace ear::test {
@@ -28,7 +28,7 @@ void pass_on(double t, Sample sample, const Tap& tap, const Take& take) {
 /// Calls `check(t, result)` after every frame, and after the steps that are made while frames are missing.
 inline void run_tapped(const simulator::Simulation& simulation, Filter& filter, const Taps& taps,
                        const std::function<void(double t, const std::optional<Estimate>& result)>& check) {
-  tools::BlindSteps steps(true, true);
+  BlindSteps steps(true, true);
   const TimeNs start_ns = simulation.deliveries().front().arrival_ns;
   for (const simulator::Delivery& delivery : simulation.deliveries()) {
     const double t = seconds_between(start_ns, delivery.arrival_ns);

@@ -37,10 +37,16 @@ LAYERS = {
     "smoother/": ["smoother/", *FILTER, "include/ear/", "eigen", "ceres", "freestanding"],
     "frontend/": ["frontend/", "include/ear/", "eigen", "opencv", *STANDARD],
     "src/": ["src/", "src/log/", *FILTER, "frontend/", "include/ear/", "eigen", "opencv", *STANDARD],
-    "src/log/": ["src/log/", "include/ear/", "spdlog", *STANDARD],
+    "src/log/": ["src/log/", "include/ear/", "spdlog", "posix", *STANDARD],
     "src/recording/": ["src/recording/", "src/log/", "include/ear/", "eigen", "opencv", "yaml-cpp", "json", *STANDARD],
     "src/bag/": ["src/bag/", "src/recording/", "include/ear/", "eigen", "ros", "yaml-cpp", *STANDARD],
     "src/mavlink/": ["src/mavlink/", *FILTER, "include/ear/", "eigen", "posix", *STANDARD],
+    # Bags and live publishers hand over the same bytes: only src/ros2/ knows what they mean.
+    "src/ros2/": ["src/ros2/", "src/recording/", "include/ear/", "eigen", "opencv", "fastcdr", *STANDARD],
+    "src/rosbag2/": ["src/rosbag2/", "src/ros2/", "src/recording/", "src/log/", "include/ear/", "eigen", "posix", *STANDARD],
+    "src/dds/": ["src/dds/", "include/ear/", "cyclone", *STANDARD],
+    "src/live/": ["src/live/", "src/", "src/dds/", "src/ros2/", "src/rosbag2/", "src/mavlink/", "src/recording/", "src/log/",
+                  *FILTER, "include/ear/", "eigen", "opencv", "posix", "yaml-cpp", *STANDARD],
     # Simulated truth shares no code with the models, and an evaluation does not know what made the estimate.
     "tools/simulator/": ["tools/simulator/", "include/ear/", "eigen", "opencv", *STANDARD],
     "tools/evaluation/": ["tools/evaluation/", "include/ear/", "eigen", "json", *STANDARD],
@@ -48,8 +54,12 @@ LAYERS = {
 EVERYTHING = [*LAYERS, "eigen", "opencv", "yaml-cpp", "json", "spdlog", "posix", "ceres", *STANDARD]
 LAYERS["tools/"] = ["tools/", "cli11", *EVERYTHING]
 LAYERS["tests/"] = ["tests/", "tools/", "doctest", *EVERYTHING]
+LAYERS["tests/live/fast_dds_player.cpp"] = ["include/ear/", "src/recording/", "fastdds", "fastcdr", *STANDARD]
 LAYERS["tests/tools/consumer/"] = ["include/ear/", *FILTER, *STANDARD]
 LAYERS["examples/c/"] = ["include/ear/", "posix", *STANDARD]
+LAYERS["examples/mavlink/"] = ["include/ear/", "src/mavlink/", *STANDARD]
+LAYERS["examples/recording/"] = ["include/ear/", "src/recording/", *STANDARD]
+LAYERS["examples/live/"] = ["include/ear/", "src/live/", *STANDARD]
 LAYERS["examples/filter_only/"] = ["include/ear/", *FILTER, "eigen", *STANDARD]
 
 # Files, output, clocks and threads: the filter would build for a microcontroller.
@@ -58,7 +68,7 @@ HOSTED = ["atomic", "chrono", "condition_variable", "cstdio", "ctime", "filesyst
 
 LIBRARIES = {"Eigen": "eigen", "unsupported": "eigen", "opencv2": "opencv", "yaml-cpp": "yaml-cpp", "spdlog": "spdlog",
              "nlohmann": "json", "CLI": "cli11", "doctest": "doctest", "sys": "posix", "ceres": "ceres", "glog": "ceres",
-             "rosbag": "ros", "sensor_msgs": "ros", "geometry_msgs": "ros"}
+             "fastcdr": "fastcdr", "dds": "cyclone", "fastdds": "fastdds", "linux": "posix", "rosbag": "ros", "sensor_msgs": "ros", "geometry_msgs": "ros"}
 
 INCLUDE = re.compile(r'^\s*#\s*include\s*["<]([^">]+)[">]')
 

@@ -53,9 +53,11 @@ class DebianPackage(unittest.TestCase):
         files = {line.split()[5] for line in output_of("dpkg-deb", "--contents", self.package).splitlines()}
         self.assertTrue(all(file.startswith("./usr/") or file in ("./", "./usr/") for file in files), files)
         for file in ("bin/ear", "include/ear/ear_c.h", "include/ear/odometry.h", "include/ear-filter/filter/filter.h",
+                     "include/ear-src/src/mavlink/link.h",
                      "share/doc/ear-msckf/copyright"):
             self.assertIn(f"./usr/{file}", files)
-        for ending in ("/libear.a", "/libear_filter.a", "/libear_frontend.a", "/libear_log.a", "/cmake/ear/earConfig.cmake"):
+        for ending in ("/libear.a", "/libear_filter.a", "/libear_frontend.a", "/libear_log.a", "/libear_mavlink.a",
+                       "/libear_recording.a", "/libear_live.a", "/systemd/system/ear-live.service", "/cmake/ear/earConfig.cmake"):
             self.assertTrue(any(file.endswith(ending) for file in files), ending)
         self.assertFalse([file for file in files if file.endswith((".cpp", ".o", ".py"))])
 

@@ -25,11 +25,13 @@ class Headers(unittest.TestCase):
 
     def test_what_they_include(self):
         """As the compiler looks for it: beside the header, then in the package's folders."""
-        for root in (PREFIX / "include", PREFIX / "include/ear-filter"):
-            for file in sorted((root / ("ear" if root.name == "include" else "filter")).rglob("*.h")):
+        folders = {"include": "ear", "ear-filter": "filter", "ear-src": "src"}
+        roots = (PREFIX / "include", PREFIX / "include/ear-filter", PREFIX / "include/ear-src")
+        for root in roots:
+            for file in sorted((root / folders[root.name]).rglob("*.h")):
                 for include in INCLUDE.findall(file.read_text(encoding="utf-8")):
                     with self.subTest(file=file, include=include):
-                        places = (file.parent, PREFIX / "include", PREFIX / "include/ear-filter")
+                        places = (file.parent, *roots)
                         self.assertTrue(any((place / include).is_file() for place in places))
 
 

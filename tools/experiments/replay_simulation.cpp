@@ -2,7 +2,7 @@
 
 #include <optional>
 
-#include "tools/blind_steps.h"
+#include "src/blind_steps.h"
 #include "tools/experiments/sample_feed.h"
 #include "tools/processor_time.h"
 
@@ -10,7 +10,7 @@ namespace ear::experiments {
 
 void replay(const simulator::Simulation& simulation, Estimator& estimator, const OnEstimate& on_estimate,
             const ReplayOptions& options) {
-  tools::BlindSteps steps(options.camera, options.wheels);
+  BlindSteps steps(options.camera, options.wheels);
   const auto report = [&](TimeNs stamp_ns, const std::optional<Estimate>& estimate) {
     if (estimate) on_estimate(stamp_ns, *estimate);
   };

@@ -28,7 +28,7 @@ struct ReplayOptions {
   OnDelivery after = {};
   bool camera = true;                ///< false: no frame is handed over
   double* processor_time = nullptr;  ///< if given, the estimator's [s] is added to it
-  bool wheels = true;                ///< false: no steps while frames are missing (tools/blind_steps.h)
+  bool wheels = true;                ///< false: no steps while frames are missing (src/blind_steps.h)
 };
 
 /// Feeds all samples and frames in the order of their arrival, as `ear run` does.

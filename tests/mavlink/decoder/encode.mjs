@@ -19,6 +19,21 @@ const packets = {
   status_text: [1, 197, 3, filled(new common.StatusText(), {
     severity: common.MavSeverity.WARNING, text: 'few features', id: 0, chunkSeq: 0,
   })],
+  highres_imu: [1, 1, 11, filled(new common.HighresImu(), {
+    timeUsec: 1234567890123n, xacc: 1.5, yacc: -2.25, zacc: 9.75, xgyro: 0.125, ygyro: -0.5, zgyro: 3, xmag: 0, ymag: 0,
+    zmag: 0, absPressure: 0, diffPressure: 0, pressureAlt: 0, temperature: 0, fieldsUpdated: 63, id: 2,
+  })],
+  scaled_imu: [1, 1, 12, filled(new common.ScaledImu(), {
+    timeBootMs: 4000000001, xacc: 1000, yacc: -500, zacc: -1000, xgyro: 1500, ygyro: -2, zgyro: 3, xmag: 9, ymag: 9,
+    zmag: 9, temperature: 2512,
+  })],
+  wheel_distance: [1, 140, 13, filled(new common.WheelDistance(), {
+    timeUsec: 1234567890123n, count: 2, distance: [12.375, -0.015625, ...Array(14).fill(0)],
+  })],
+  distance_sensor: [1, 1, 14, filled(new common.DistanceSensor(), {
+    timeBootMs: 4000000001, minDistance: 2, maxDistance: 400, currentDistance: 37, type: 0, id: 7, orientation: 25,
+    covariance: 255, horizontalFov: 0, verticalFov: 0, quaternion: [0, 0, 0, 0], signalQuality: 55,
+  })],
   odometry: [1, 197, 200, filled(new common.Odometry(), {
     timeUsec: 1600000000123456n, frameId: common.MavFrame.LOCAL_FRD, childFrameId: common.MavFrame.BODY_FRD,
     x: 1.5, y: -2.25, z: -0.75, q: [0.5, -0.5, 0.5, -0.5], vx: 0.125, vy: -8, vz: 3, rollspeed: 0.5, pitchspeed: -1,

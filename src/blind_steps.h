@@ -6,7 +6,7 @@
 
 #include "ear/types.h"
 
-namespace ear::tools {
+namespace ear {
 
 /// Without images the wheels carry on: always on a vehicle without a camera, else while images are missing. Without
 /// wheels there is nothing but inertia, and its estimate would be no more than a plausible lie. Times are IMU times.
@@ -41,4 +41,4 @@ class BlindSteps {
   TimeNs next_step_ns_ = 0;
 };
 
-}  // namespace ear::tools
+}  // namespace ear

@@ -1,0 +1,169 @@
+#include "src/live/live_estimator.h"
+
+#include <time.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+namespace ear::live {
+namespace {
+
+using SteadyClock = std::chrono::steady_clock;
+
+constexpr TimeNs kNever = std::numeric_limits<TimeNs>::min();
+constexpr std::chrono::milliseconds kPatience{100};   // with readings that belong before a frame and are not there
+constexpr std::chrono::milliseconds kNoSamples{500};  // a frame waits for inertial samples, at most
+constexpr TimeNs kLongestHeld = 300'000'000;          // samples are handed over without a frame after this time
+constexpr TimeNs kDead = 500'000'000;                 // without a reading: the sensor is not waited for
+constexpr long kWakeNs = 5'000'000;                   // the thread looks again, whatever was missed
+
+TimeNs period(double rate_hz) { return std::llround(1e9 / rate_hz); }
+
+std::size_t sample_slots(const Calibration& calibration, const QueueCapacity& capacity) {
+  return static_cast<std::size_t>(std::ceil(2.0 * capacity.seconds * calibration.imu.rate_hz)) + 32;
+}
+
+}  // namespace
+
+LiveEstimator::LiveEstimator(const Config& config, const Calibration& calibration, const QueueCapacity& capacity,
+                             LiveListeners listeners)
+    : queued_(config, calibration, capacity),
+      samples_(sample_slots(calibration, capacity), {}),
+      listeners_(std::move(listeners)),
+      steps_(!calibration.cameras.empty(), calibration.encoder.has_value()),
+      reached_ns_(kNever) {
+  if (calibration.encoder) encoder_.period_ns = period(calibration.encoder->rate_hz);
+  if (calibration.lasers) laser_.period_ns = period(calibration.lasers->rate_hz);
+  ::sem_init(&news_, 0, 0);
+  thread_ = std::thread([this] { run(); });
+}
+
+LiveEstimator::~LiveEstimator() {
+  stop();
+  ::sem_destroy(&news_);
+}
+
+void LiveEstimator::stop() {
+  if (!thread_.joinable()) return;
+  stop_ = true;
+  wake();
+  thread_.join();
+}
+
+bool LiveEstimator::add_imu(const ImuSample& sample, std::optional<NavState>* state) {
+  const bool taken = queued_.add_imu(sample);
+  const std::optional<NavState> live = queued_.live();
+  if (state != nullptr) *state = live;
+  LiveSample* const slot = taken ? samples_.slot_to_fill() : nullptr;
+  if (slot != nullptr) {
+    *slot = {sample, live};
+    samples_.push();
+  }
+  wake();
+  return taken;
+}
+
+bool LiveEstimator::add_encoder(const EncoderSample& sample) {
+  const bool taken = queued_.add_encoder(sample);
+  if (taken) encoder_.newest_ns = sample.t_ns;
+  return taken;
+}
+
+bool LiveEstimator::add_laser(const QueuedOdometry::Ranges& ranges) {
+  const bool taken = queued_.add_laser(ranges);
+  if (taken) laser_.newest_ns = ranges.t_ns;
+  return taken;
+}
+
+bool LiveEstimator::add_stereo(const StereoFrame& frame) {
+  const bool taken = queued_.add_stereo(frame);
+  wake();
+  return taken;
+}
+
+void LiveEstimator::run() {
+  while (true) {
+    while (advance()) continue;
+    if (stop_) return;
+    timespec until{};
+    ::clock_gettime(CLOCK_REALTIME, &until);
+    until.tv_nsec += kWakeNs;
+    until.tv_sec += until.tv_nsec / 1'000'000'000;
+    until.tv_nsec %= 1'000'000'000;
+    ::sem_timedwait(&news_, &until);
+    while (::sem_trywait(&news_) == 0) continue;  // one look serves all that came
+  }
+}
+
+/// One frame or one inertial sample; false: nothing can be done before more comes.
+bool LiveEstimator::advance() {
+  const std::optional<TimeNs> frame_ns = queued_.next_frame_ns();
+  if (!frame_ns) {
+    waits_.reset();
+  } else if (reached_ns_ >= *frame_ns) {
+    return take_frame(*frame_ns);
+  }
+  if (samples_.front() != nullptr) {
+    take_sample();
+    return true;
+  }
+  if (!frame_ns) return false;
+  // No inertial samples: the frame goes on without, once all slots are taken.
+  if (!waits_) waits_ = SteadyClock::now();
+  if (SteadyClock::now() - *waits_ < kNoSamples) return false;
+  return take_frame(*frame_ns);
+}
+
+/// False: it stays, and waits for other sensors.
+bool LiveEstimator::take_frame(TimeNs frame_ns) {
+  if (!stop_ && (is_owed(encoder_) || is_owed(laser_))) {
+    if (!waits_) waits_ = SteadyClock::now();
+    if (SteadyClock::now() - *waits_ < kPatience) return false;
+    ++impatient_;
+  }
+  std::optional<Estimate> estimate;
+  if (queued_.process(estimate) == Progress::no_frame) {
+    reached_ns_ = kNever;  // the stamp that reached it was a false one
+    return false;
+  }
+  waits_.reset();
+  handed_over_ns_ = frame_ns;
+  steps_.saw_frame(frame_ns);
+  report(std::move(estimate), frame_ns);
+  return true;
+}
+
+void LiveEstimator::take_sample() {
+  const LiveSample sample = *samples_.front();
+  samples_.pop();
+  reached_ns_ = sample.imu.t_ns;
+  if (listeners_.on_imu) listeners_.on_imu(sample);
+  if (queued_.next_frame_ns()) return;
+  if (steps_.due(reached_ns_)) {
+    handed_over_ns_ = reached_ns_;
+    report(queued_.step(reached_ns_), reached_ns_);
+  } else if (std::abs(duration_ns(handed_over_ns_, reached_ns_)) > kLongestHeld) {
+    handed_over_ns_ = reached_ns_;
+    std::optional<Estimate> none;
+    queued_.process(none);  // there is no frame: this only empties the queues
+  }
+}
+
+/// Is a reading on its way that is no later than the inertial samples? Stamps vary by a tenth of the period.
+bool LiveEstimator::is_owed(const Beside& stream) const {
+  const TimeNs newest = stream.newest_ns;
+  if (stream.period_ns == 0 || newest == 0) return false;
+  const TimeNs age = duration_ns(newest, reached_ns_);
+  return age >= stream.period_ns - stream.period_ns / 10 && age < std::max(kDead, 5 * stream.period_ns);
+}
+
+void LiveEstimator::report(std::optional<Estimate> estimate, TimeNs t_ns) {
+  if (!listeners_.on_frame) return;
+  const Odometry& odometry = queued_.odometry();
+  listeners_.on_frame({t_ns, std::move(estimate), odometry.status(), odometry.health()}, odometry);
+}
+
+}  // namespace ear::live

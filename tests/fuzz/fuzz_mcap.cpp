@@ -1,0 +1,9 @@
+// Files that may be MCAP.
+#include "tests/fuzz/bag_support.h"
+
+// NOLINTNEXTLINE(readability-identifier-naming): libFuzzer's name
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  static const ear::fuzz::Folder kFolder;
+  ear::fuzz::read_bag(kFolder.write("bag.mcap", {reinterpret_cast<const char*>(data), size}));
+  return 0;
+}
