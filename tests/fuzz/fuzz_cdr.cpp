@@ -1,5 +1,5 @@
-// Messages of ROS 2. First byte: which type. All that may happen is a message, which is then the same when it is written
-// and read again, or an InputError; and what sensors make of it.
+// Messages of ROS 2. First byte: which type. All that may happen is a message, which is then the same when it is
+// written and read again, or an InputError; and what sensors make of it.
 #include "src/ros2/cdr.h"
 
 #include <vector>
