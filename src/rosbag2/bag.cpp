@@ -1,8 +1,7 @@
 #include "src/rosbag2/bag.h"
 
-#include <stdlib.h>
-
 #include <algorithm>
+#include <cstdlib>
 #include <system_error>
 #include <utility>
 

@@ -1,8 +1,7 @@
 #include "src/rosbag2/bag_calibration.h"
 
-#include <stdlib.h>
-
 #include <algorithm>
+#include <cstdlib>
 #include <fstream>
 #include <optional>
 #include <system_error>
