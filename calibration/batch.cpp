@@ -48,19 +48,19 @@ class ProgressCallback final : public ceres::IterationCallback {
 
 }  // namespace
 
-Batch::Batch(const Calibration& given, const Priors& priors, const std::vector<Drive>& drives, const Noise& noise)
+Batch::Batch(const Calibration& given, const Priors& priors, const Parameters& start, const Noise& noise)
     : given_(given),
       priors_(priors),
       noise_(noise),
       cameras_(given_cameras(given)),
-      parameters_(zero_parameters(given)),
+      parameters_(start),
       blocks_(blocks_of(parameters_, given, priors)),
-      manifold_(std::make_unique<smoother::PoseManifold>()) {
-  for (const Drive& drive : drives) {
-    segments_.push_back(make_segment(drive, given, PointChoice{}));
-    if (given.lasers) mark_ground(segments_.back(), *given.lasers);
-    if (given.encoder) guess_ground(segments_.back(), odometer_of(*given.encoder));
-  }
+      manifold_(std::make_unique<smoother::PoseManifold>()) {}
+
+void Batch::add(const Drive& drive, const FirstGuess& guess) {
+  segments_.push_back(make_segment(drive, guess, given_, PointChoice{}));
+  if (given_.lasers) mark_ground(segments_.back(), *given_.lasers);
+  if (given_.encoder) guess_ground(segments_.back(), odometer_of(*applied(given_, parameters_).encoder));
 }
 
 CameraState Batch::cameras_now() const {
@@ -71,7 +71,7 @@ CameraState Batch::cameras_now() const {
   return now;
 }
 
-ceres::ResidualBlockId Batch::add(TermBlock term, ceres::CostFunction* cost, ceres::LossFunction* loss,
+ceres::ResidualBlockId Batch::add_term(TermBlock term, ceres::CostFunction* cost, ceres::LossFunction* loss,
                                   const std::vector<double*>& blocks) {
   term.id = problem_->AddResidualBlock(cost, loss, blocks);
   terms_.push_back(term);
@@ -122,15 +122,15 @@ void Batch::add_priors() {
     const auto n = static_cast<Eigen::Index>(block.entries.size());
     Eigen::MatrixXd A = Eigen::MatrixXd::Zero(n, n);
     for (Eigen::Index k = 0; k < n; ++k) A(k, k) = 1.0 / block.entries[static_cast<std::size_t>(k)].prior;
-    add({}, new ceres::NormalPrior(A, Eigen::VectorXd::Zero(n)), nullptr, {block.data});
+    add_term({}, new ceres::NormalPrior(A, Eigen::VectorXd::Zero(n)), nullptr, {block.data});
   }
   for (Segment& segment : segments_) {
     Keyframe& first = segment.keyframes.front();
-    const NavState& state = segment.drive->states.front().state;
-    add({}, new OriginFactor(OriginModel{{state.q_WB.toRotationMatrix(), state.p_WB}}), nullptr, {first.pose.data()});
+    const NavState state = state_of(first);
+    add_term({}, new OriginFactor(OriginModel{{state.q_WB.toRotationMatrix(), state.p_WB}}), nullptr, {first.pose.data()});
     const BiasModel bias{given_.imu.gyro_bias_sigma.value_or(kGyroBias),
                          given_.imu.accel_bias_sigma.value_or(kAccelBias)};
-    add({}, new BiasFactor(bias), nullptr, {first.motion.data()});
+    add_term({}, new BiasFactor(bias), nullptr, {first.motion.data()});
   }
 }
 
@@ -140,7 +140,7 @@ void Batch::add_inertial(std::size_t s) {
     Keyframe& a = keyframes[i];
     Keyframe& b = keyframes[i + 1];
     const auto measured = preintegrated(a.since, state_of(a), given_.imu);
-    add({Term::inertial, nullptr, s, i, 0, a.t_ns}, new smoother::ImuFactor(measured), nullptr,
+    add_term({Term::inertial, nullptr, s, i, 0, a.t_ns}, new smoother::ImuFactor(measured), nullptr,
         {a.pose.data(), a.motion.data(), b.pose.data(), b.motion.data()});
   }
 }
@@ -160,7 +160,7 @@ void Batch::add_rolls(std::size_t s) {
     const Eigen::Vector3d n_k = state.q_WB.conjugate() * n_W.normalized();
     const auto roll = roll_along(a.path, state.b_g, n_k, angles, setting);
     if (!roll) continue;
-    add({Term::roll, nullptr, s, i, 0, a.t_ns}, new RollFactor(*roll), new ceres::HuberLoss(kRollHuber),
+    add_term({Term::roll, nullptr, s, i, 0, a.t_ns}, new RollFactor(*roll), new ceres::HuberLoss(kRollHuber),
         {a.pose.data(), b.pose.data(), a.motion.data(), parameters_.wheels.data(), parameters_.axle.data(),
          parameters_.encoder_time.data()});
   }
@@ -172,14 +172,14 @@ void Batch::add_ground(std::size_t s) {
   for (std::size_t i = 0; i < keyframes.size(); ++i) {
     Keyframe& a = keyframes[i];
     if (a.on_ground) {
-      add({Term::stand, nullptr, s, i, 0, a.t_ns}, new StandFactor(StandModel{given, a.centre, noise_.stand}),
+      add_term({Term::stand, nullptr, s, i, 0, a.t_ns}, new StandFactor(StandModel{given, a.centre, noise_.stand}),
           new ceres::HuberLoss(kBeamHuber),
           {a.pose.data(), a.ground.data(), parameters_.wheels.data(), parameters_.axle.data()});
     }
     if (i + 1 == keyframes.size()) continue;
     Keyframe& b = keyframes[i + 1];
     const double way = std::sqrt(std::hypot(b.centre.x - a.centre.x, b.centre.y - a.centre.y) + 1e-4);
-    add({Term::ground, nullptr, s, i, 0, a.t_ns},
+    add_term({Term::ground, nullptr, s, i, 0, a.t_ns},
         new GroundFactor(GroundModel{a.centre, b.centre, noise_.ground_height * way, noise_.ground_slope * way}), nullptr,
         {a.ground.data(), b.ground.data()});
   }
@@ -206,7 +206,7 @@ void Batch::add_beams(std::size_t s, double gate) {
       double residual = 0.0;
       cost->Evaluate(blocks.data(), &residual, nullptr);
       if (!std::isfinite(residual) || (gate > 0.0 && std::abs(residual) > gate)) continue;
-      add({Term::beam, nullptr, s, i, k, sample.t_ns}, cost.release(), new ceres::HuberLoss(kBeamHuber), blocks);
+      add_term({Term::beam, nullptr, s, i, k, sample.t_ns}, cost.release(), new ceres::HuberLoss(kBeamHuber), blocks);
     }
   }
 }
@@ -222,12 +222,12 @@ void Batch::add_points(std::size_t s) {
       const Eigen::Vector3d v_B = smoother::to_pose(keyframe.pose.data()).R.transpose() * v_W;
       PixelObservation observation{seen.left_px, noise_.pixel, keyframe.late, keyframe.rate_B, v_B};
       const TermBlock term{Term::pixel, nullptr, s, p, 0, keyframe.t_ns};
-      add(term, new LeftPixel(observation, cameras_, point.anchor), new ceres::HuberLoss(kPixelHuber),
+      add_term(term, new LeftPixel(observation, cameras_, point.anchor), new ceres::HuberLoss(kPixelHuber),
           {keyframe.pose.data(), parameters_.camera.data(), parameters_.lens[0].data(), parameters_.camera_time.data(),
            point.block.data()});
       if (!seen.has_right) continue;
       observation.px = seen.right_px;
-      add(term, new RightPixel(observation, cameras_, point.anchor), new ceres::HuberLoss(kPixelHuber),
+      add_term(term, new RightPixel(observation, cameras_, point.anchor), new ceres::HuberLoss(kPixelHuber),
           {keyframe.pose.data(), parameters_.camera.data(), parameters_.stereo.data(), parameters_.lens[1].data(),
            parameters_.camera_time.data(), point.block.data()});
     }
@@ -242,7 +242,7 @@ void Batch::add_reference(std::size_t s) {
     Keyframe& keyframe = segment.keyframes[i];
     if (position.t_ns < keyframe.t_ns || keyframe.path.empty() || position.t_ns > keyframe.path.back().t_ns) continue;
     const ReferenceModel model{position.p, at(keyframe.path, position.t_ns).p_kt, segment.drive->reference_sigma};
-    add({Term::reference, nullptr, s, i, 0, position.t_ns}, new ReferenceFactor(model), new ceres::HuberLoss(3.0),
+    add_term({Term::reference, nullptr, s, i, 0, position.t_ns}, new ReferenceFactor(model), new ceres::HuberLoss(3.0),
         {keyframe.pose.data(), segment.reference.data()});
   }
 }

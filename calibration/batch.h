@@ -39,8 +39,10 @@ struct TermBlock {
 
 class Batch {
  public:
-  /// `drives` must outlive it. Throws std::invalid_argument where one of them cannot be used.
-  Batch(const Calibration& given, const Priors& priors, const std::vector<Drive>& drives, const Noise& noise);
+  /// `start`: of the iteration.
+  Batch(const Calibration& given, const Priors& priors, const Parameters& start, const Noise& noise);
+  /// `drive` must outlive this. Throws std::invalid_argument where it cannot be used.
+  void add(const Drive& drive, const FirstGuess& guess);
 
   Batch(const Batch&) = delete;  // blocks do not move
   Batch& operator=(const Batch&) = delete;
@@ -73,8 +75,8 @@ class Batch {
   void add_beams(std::size_t segment, double gate);
   void add_points(std::size_t segment);
   void add_reference(std::size_t segment);
-  ceres::ResidualBlockId add(TermBlock term, ceres::CostFunction* cost, ceres::LossFunction* loss,
-                             const std::vector<double*>& blocks);
+  ceres::ResidualBlockId add_term(TermBlock term, ceres::CostFunction* cost, ceres::LossFunction* loss,
+                                  const std::vector<double*>& blocks);
   [[nodiscard]] CameraState cameras_now() const;
 
   Calibration given_;

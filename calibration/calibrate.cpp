@@ -16,6 +16,7 @@ constexpr double kGate = 6.0;      // [sigma] of beams, once there is a solution
 constexpr int kFirst = 12;         // iterations
 constexpr int kNext = 6;
 constexpr int kRounds = 3;
+constexpr double kLeftOut = 4.0;   // [s] of a drive: standing before the start
 
 std::vector<Entry> all_entries(const std::vector<ParameterBlock>& blocks) {
   std::vector<Entry> entries;
@@ -39,6 +40,34 @@ void minimise(Batch& batch, const Settings& settings) {
     }
     if (round + 1 < kRounds) batch.learn_noise();
   }
+}
+
+/// All drives, with the calibration at hand.
+struct Passed {
+  std::unique_ptr<Batch> batch;
+  double left_out = 0.0;  ///< [s]
+};
+
+Passed pass(const Calibration& given, const Priors& priors, const Parameters& start, const Calibration& now,
+            const std::vector<Drive>& drives, const Settings& settings) {
+  Passed passed{std::make_unique<Batch>(given, priors, start, settings.noise), 0.0};
+  for (const Drive& drive : drives) {
+    if (settings.progress) settings.progress(drive.name + ": first guess of the motion");
+    const FirstGuess guess = guess_motion(drive, given, now, settings.filter, settings.interval);
+    passed.batch->add(drive, guess);
+    passed.left_out += guess.left_out;
+  }
+  minimise(*passed.batch, settings);
+  return passed;
+}
+
+/// Over again where the calibration given was so wrong that the filter lost its way: with the one that was found.
+Passed pass_until_whole(const Calibration& given, const Priors& priors, const std::vector<Drive>& drives,
+                        const Settings& settings) {
+  Passed first = pass(given, priors, zero_parameters(given), with_priors(given, priors), drives, settings);
+  if (first.left_out < kLeftOut * static_cast<double>(drives.size())) return first;
+  const Parameters found = first.batch->parameters();
+  return pass(given, priors, found, applied(given, found), drives, settings);
 }
 
 /// What was not shown goes back to the given value, and what hangs on it with it: the mean of the others given these.
@@ -72,8 +101,8 @@ void find_entangled(const std::vector<Entry>& entries, const Eigen::MatrixXd& P,
 Result calibrate(const Calibration& given, const Priors& priors, const std::vector<Drive>& drives,
                  const Settings& settings) {
   if (drives.empty()) throw std::invalid_argument("no drive to calibrate from");
-  Batch batch(given, priors, drives, settings.noise);
-  minimise(batch, settings);
+  const Passed passed = pass_until_whole(given, priors, drives, settings);
+  Batch& batch = *passed.batch;
   if (settings.progress) settings.progress("covariance");
   const auto P = parameter_covariance(batch, settings.threads);
   if (!P) throw std::runtime_error("the covariance cannot be computed: the problem is singular");
@@ -103,6 +132,7 @@ Result calibrate(const Calibration& given, const Priors& priors, const std::vect
   result.noise = batch.noise();
   result.encoder_time = batch.parameters().encoder_time[0];
   result.laser_time = batch.parameters().laser_time[0];
+  result.left_out = passed.left_out;
   result.calibration = with_sigmas(applied(given, batch.parameters()), result.findings);
   return result;
 }

@@ -41,9 +41,12 @@ struct Result {
   Noise noise;
   std::vector<SensorFit> fits;
   double encoder_time = 0.0, laser_time = 0.0;  ///< [s] to add to the stamps
+  double left_out = 0.0;                        ///< [s] of the drives, where there was no estimate in one piece
 };
 
 struct Settings {
+  FilterConfig filter;    ///< of the first guess
+  double interval = 0.2;  ///< [s] between keyframes
   Noise noise;
   int threads = 2;
   /// What the drives must have brought a standard deviation down to, of its prior, for a value to be changed.

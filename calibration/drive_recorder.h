@@ -8,9 +8,9 @@ namespace ear::calibration {
 
 class DriveRecorder final : public Estimator {
  public:
-  /// `drive` is filled, and must outlive this. Images closer together than `interval` [s] are passed on to the filter,
-  /// but not written down.
-  DriveRecorder(const FilterConfig& config, const Calibration& calibration, Drive& drive, double interval);
+  /// `drive` is filled, and must outlive this.
+  DriveRecorder(const FilterConfig& config, const Calibration& calibration, Drive& drive)
+      : filter_(config, calibration), drive_(drive) {}
 
   void start_at(const GivenStart& start) override { filter_.start_at(start); }
   void add_imu(const ImuSample& sample) override;
@@ -20,7 +20,7 @@ class DriveRecorder final : public Estimator {
   [[nodiscard]] std::optional<RelativeMotion> motion_to(TimeNs t_ns) const override { return filter_.motion_to(t_ns); }
   [[nodiscard]] std::optional<TimeNs> common_stamp(TimeNs stamp_ns) override { return filter_.common_stamp(stamp_ns); }
   std::optional<Estimate> process(const FeatureFrame& frame) override;
-  std::optional<Estimate> process_without_image(TimeNs t_ns) override;
+  std::optional<Estimate> process_without_image(TimeNs t_ns) override { return filter_.process_without_image(t_ns); }
   [[nodiscard]] std::optional<NavState> predict(TimeNs t_ns) const override { return filter_.predict(t_ns); }
 
   [[nodiscard]] Status status() const override { return filter_.status(); }
@@ -33,15 +33,8 @@ class DriveRecorder final : public Estimator {
   [[nodiscard]] CalibrationState calibration() const override { return filter_.calibration(); }
 
  private:
-  [[nodiscard]] bool due(TimeNs t_ns) const;
-
   Filter filter_;
   Drive& drive_;
-  TimeNs interval_ns_;
 };
-
-/// How the filter is set up to give the first guess: from the cameras, where there are any, for wheels and beams that
-/// are not yet calibrated would mislead it.
-[[nodiscard]] FilterConfig config_for_first_guess(FilterConfig config, const Calibration& calibration);
 
 }  // namespace ear::calibration

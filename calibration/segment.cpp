@@ -8,9 +8,7 @@
 namespace ear::calibration {
 namespace {
 
-constexpr double kLongestGap = 1.0;  // [s] between two keyframes
-
-Keyframe make_keyframe(const DriveState& from, const Calibration& given) {
+Keyframe make_keyframe(const GuessedState& from, const Calibration& given) {
   Keyframe keyframe;
   const NavState& state = from.state;
   keyframe.t_ns = state.t_ns;
@@ -26,12 +24,11 @@ void connect(Segment& segment) {
   for (std::size_t i = 0; i + 1 < segment.keyframes.size(); ++i) {
     Keyframe& keyframe = segment.keyframes[i];
     const TimeNs next_ns = segment.keyframes[i + 1].t_ns;
-    const double gap = seconds_between(keyframe.t_ns, next_ns);
     keyframe.since = pieces_between(drive.imu, keyframe.t_ns, next_ns);
-    if (gap > kLongestGap || keyframe.since.empty()) {
+    if (keyframe.since.empty()) {
       const double at = seconds_between(segment.keyframes.front().t_ns, keyframe.t_ns);
-      throw std::invalid_argument(drive.name + ": no estimate or no inertial samples for " + std::to_string(gap) +
-                                  " s, " + std::to_string(at) + " s after the start: a calibration needs one piece");
+      throw std::invalid_argument(drive.name + ": inertial samples are missing " + std::to_string(at) +
+                                  " s after the first estimate: a calibration needs all of them");
     }
   }
 }
@@ -40,11 +37,11 @@ Eigen::Vector2d pixel(const CameraCalibration& camera, const Eigen::Vector2d& no
   return to_pixel<double>(camera, {}, normalized);
 }
 
-std::vector<Point> all_points(const Drive& drive, const Calibration& given) {
+std::vector<Point> all_points(const FirstGuess& guess, const Calibration& given) {
   std::unordered_map<std::uint64_t, std::size_t> index;
   std::vector<Point> points;
-  for (std::size_t k = 0; k < drive.states.size(); ++k) {
-    for (const FeatureObservation& feature : drive.states[k].features) {
+  for (std::size_t k = 0; k < guess.states.size(); ++k) {
+    for (const FeatureObservation& feature : guess.states[k].features) {
       const auto [found, added] = index.emplace(feature.id, points.size());
       if (added) points.emplace_back();
       Seen seen;
@@ -81,14 +78,13 @@ void choose_points(std::vector<Point>& all, const PointChoice& choice, Segment& 
 
 }  // namespace
 
-Segment make_segment(const Drive& drive, const Calibration& given, const PointChoice& choice) {
-  if (drive.states.size() < 10) throw std::invalid_argument(drive.name + ": too short: hardly any estimate");
+Segment make_segment(const Drive& drive, const FirstGuess& guess, const Calibration& given, const PointChoice& choice) {
   Segment segment;
   segment.drive = &drive;
-  for (const DriveState& state : drive.states) segment.keyframes.push_back(make_keyframe(state, given));
+  for (const GuessedState& state : guess.states) segment.keyframes.push_back(make_keyframe(state, given));
   connect(segment);
   if (!given.cameras.empty()) {
-    std::vector<Point> points = all_points(drive, given);
+    std::vector<Point> points = all_points(guess, given);
     choose_points(points, choice, segment);
   }
   return segment;

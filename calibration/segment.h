@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "calibration/drive.h"
+#include "calibration/first_guess.h"
 #include "calibration/inertial_path.h"
 #include "calibration/models.h"
 #include "calibration/pixel_factor.h"
@@ -15,7 +16,7 @@
 namespace ear::calibration {
 
 struct Keyframe {
-  TimeNs t_ns = 0;  ///< IMU time
+  TimeNs t_ns = 0;    ///< IMU time
   double late = 0.0;  ///< [s] of its image: stamp and given time offset, less t_ns
   smoother::PoseBlock pose{};
   smoother::MotionBlock motion{};
@@ -57,9 +58,10 @@ struct PointChoice {
   std::size_t per_keyframe = 40;  ///< wanted; longest first
 };
 
-/// Keyframes from the drive's states, features that last; where the wheels are on the ground (grounded.h) is not known
-/// yet. Throws std::invalid_argument, naming the drive, where the states have gaps.
-[[nodiscard]] Segment make_segment(const Drive& drive, const Calibration& given, const PointChoice& choice);
+/// Keyframes from the states guessed, features that last; where the wheels are on the ground (grounded.h) is not known
+/// yet. Throws std::invalid_argument, naming the drive, where inertial samples are missing.
+[[nodiscard]] Segment make_segment(const Drive& drive, const FirstGuess& guess, const Calibration& given,
+                                   const PointChoice& choice);
 
 /// The state of a keyframe's blocks.
 [[nodiscard]] NavState state_of(const Keyframe& keyframe);

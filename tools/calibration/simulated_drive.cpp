@@ -1,12 +1,24 @@
 #include "tools/calibration/simulated_drive.h"
 
-#include "calibration/drive_recorder.h"
-#include "tools/experiments/replay_simulation.h"
+#include "calibration/lens.h"
+#include "frontend/lens.h"
 
 namespace ear::calibration {
 namespace {
 constexpr double kDegree = 3.14159265358979323846 / 180.0;
-constexpr double kInterval = 0.2;  // [s] between keyframes
+
+/// Simulated tracks come without a lens. Here they pass the true one, and the one that was given is taken out.
+void see_through(const Calibration& truth, const Calibration& given, FeatureFrame& frame) {
+  const auto seen = [&](std::size_t camera, const Eigen::Vector2d& ray) {
+    const Eigen::Vector2d pixel = to_pixel<double>(truth.cameras[camera], {}, ray);
+    return Lens(given.cameras[camera]).to_normalized(pixel).value_or(ray);
+  };
+  for (FeatureObservation& feature : frame.features) {
+    feature.left = seen(0, feature.left);
+    if (feature.has_right) feature.right = seen(1, feature.right);
+  }
+}
+
 }  // namespace
 
 Priors drawn_priors(double factor) {
@@ -34,17 +46,20 @@ Priors drawn_priors(double factor) {
 Drive recorded_drive(const simulator::Simulation& simulation, const Calibration& given) {
   Drive drive;
   drive.name = simulation.options().sequence;
-  DriveRecorder recorder(config_for_first_guess(FilterConfig{}, given), given, drive, kInterval);
-  experiments::ReplayOptions options;
-  options.wheels = false;
-  experiments::replay(simulation, recorder, [](TimeNs, const Estimate&) {}, options);
+  drive.imu = simulation.imu();
+  drive.encoders = simulation.encoders();
+  drive.lasers = simulation.lasers();
+  for (std::size_t i = 0; i < simulation.frames().size(); ++i) {
+    drive.frames.push_back(simulation.tracks(i));
+    see_through(simulation.true_calibration(), given, drive.frames.back());
+  }
   return drive;
 }
 
 SimulatedCalibration calibrate_simulated(const simulator::Simulation& simulation, const Settings& settings) {
   const double factor = simulation.options().calibration_error.value_or(1.0);
   const Priors priors = drawn_priors(factor);
-  Calibration given = with_priors(simulation.calibration(), priors);
+  Calibration given = simulation.calibration();
   given.imu.accel_bias_sigma = 0.08 * std::max(1.0, factor);
   const std::vector<Drive> drives{recorded_drive(simulation, given)};
   SimulatedCalibration made;

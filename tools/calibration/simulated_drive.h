@@ -16,7 +16,7 @@ struct SimulatedCalibration {
   std::vector<double> errors;  ///< true less calibrated, of each finding in its unit
 };
 
-/// What a filter that starts with `given` makes of the simulation's samples and tracks.
+/// The simulation's samples and tracks, the latter through its true lens and that of `given`.
 [[nodiscard]] Drive recorded_drive(const simulator::Simulation& simulation, const Calibration& given);
 
 /// With the priors that the calibration was drawn from; Options::calibration_error must be stated.

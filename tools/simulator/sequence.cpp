@@ -331,21 +331,28 @@ Sequence sway3() {
 
 // What shows every part of the calibration: `ear calibrate --plan`.
 Sequence calibrate() {
-  const auto hover = [](double length, double lateral) { return in_air(drift(length < 0.0 ? reverse(-length, 0.5) : drive(length, 0.5), lateral)); };
-  const auto aside = [](double lateral) { return in_air(drift(stand(1.4), lateral)); };
+  const auto aside = [](double left) { return in_air(drift(stand(1.4), left)); };
+  const auto ahead = [](double forward) {
+    Leg leg = in_air(stand(1.4));
+    leg.forward = forward;
+    return leg;
+  };
   return {"calibrate",
           "the drive that shows the calibration: swings, turns on the spot, figures of eight, hops with tilts",
           Terrain(),
           {4.0, 4.4},
           0.0,
-          {stand(3.0), sway(10.0, 10.0), spin(400, 1.0), stand(0.5), spin(-400, 1.0), stand(0.5),
-           turn(0.9, 360, 0.8), turn(0.9, -360, 0.8), turn(0.9, 360, 0.9), turn(0.9, -360, 0.9), stand(1.0),
-           drive(4.0, 1.0), stand(0.6), reverse(4.0, 1.0), stand(1.0),
-           take_off(0.7, 1.6), aside(0.6), aside(-0.6), hover(0.7, 0.0), aside(-0.6), aside(0.6), hover(-0.7, 0.0),
-           in_air(spin(90, 0.9)), aside(0.6), aside(-0.6), stand(0.8), land(0.7), stand(1.5), sway(6.0, 10.0),
-           spin(-90, 0.9), take_off(1.0, 2.0), aside(-0.6), aside(0.6), hover(0.7, 0.3), hover(-0.7, -0.3),
-           in_air(spin(-90, 0.9)), aside(-0.6), aside(0.6), stand(0.8), land(1.0), stand(1.5),
-           spin(90, 0.9), drive(3.0, 1.0), stand(0.6), reverse(3.0, 0.8), stand(3.0)}};
+          {stand(3.0),         sway(10.0, 10.0),    spin(400, 1.0),     stand(0.5),          spin(-400, 1.0),
+           stand(0.5),         turn(0.9, 360, 0.8), turn(0.9, -360, 0.8), turn(0.9, 360, 0.9), turn(0.9, -360, 0.9),
+           stand(1.0),         drive(4.0, 1.0),     stand(0.6),         reverse(4.0, 1.0),   stand(1.0),
+           take_off(0.4, 1.2), aside(1.0),          aside(-1.0),        aside(1.0),          aside(-1.0),
+           ahead(0.8),         ahead(-0.8),         stand(0.8),         land(0.4),           stand(1.5),
+           sway(6.0, 10.0),    take_off(1.5, 2.4),  aside(1.0),         aside(-1.0),         ahead(1.0),
+           ahead(-1.0),        in_air(spin(90, 0.9)), aside(-1.0),      aside(1.0),          aside(-1.0),
+           aside(1.0),         in_air(spin(-90, 0.9)), stand(0.8),      land(1.5),           stand(1.5),
+           take_off(0.4, 1.2), aside(-1.0),         aside(1.0),         aside(-1.0),         aside(1.0),
+           stand(0.8),         land(0.4),           stand(1.0),         spin(90, 0.9),       drive(2.0, 1.0),
+           stand(0.6),         reverse(2.0, 0.8),   stand(3.0)}};
 }
 
 std::vector<Sequence> all_sequences() {
