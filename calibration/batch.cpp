@@ -20,7 +20,8 @@ constexpr double kBeamHuber = 3.0;
 constexpr double kGyroBias = 0.1;  // [rad/s] where nothing is stated
 constexpr double kAccelBias = 0.5;  // [m/s^2]
 constexpr double kWildPixel = 8.0;  // [sigma] of both coordinates: the feature is used no more
-constexpr double kConverged = 1e-7;
+constexpr double kConverged = 1e-8;
+constexpr double kRegion = 1e14;  // nearly Gauss-Newton: damping would hold the scale, which is shown weakly, where it is
 
 Pose to_pose(const Eigen::Isometry3d& T) { return {T.linear(), T.translation()}; }
 
@@ -303,7 +304,8 @@ bool Batch::solve(int iterations, int threads, const Progress& progress) {
   if (points) options.linear_solver_ordering = order;
   options.max_num_iterations = iterations;
   options.function_tolerance = kConverged;
-  options.initial_trust_region_radius = 1e6;
+  options.initial_trust_region_radius = kRegion;
+  options.max_trust_region_radius = 1e6 * kRegion;
   options.num_threads = threads;
   options.logging_type = ceres::SILENT;
   ProgressCallback callback(progress);

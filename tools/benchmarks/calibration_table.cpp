@@ -29,6 +29,8 @@ struct Arguments {
   std::optional<double> duration;
   int threads = 2;
   bool verbose = false;
+  bool perfect_sensors = false;
+  double track_sigma = 0.5;
 };
 
 /// Of one parameter over all vehicles.
@@ -79,6 +81,8 @@ void calibration_table(const Arguments& args) {
     options.seed = seeds[i];
     options.duration = args.duration;
     options.calibration_error = args.calibration_error;
+    options.sensor_noise = !args.perfect_sensors;
+    options.track.sigma_px = args.track_sigma;
     const simulator::Simulation simulation(options);
     const auto start = std::chrono::steady_clock::now();
     calibration::Settings settings;
@@ -92,6 +96,11 @@ void calibration_table(const Arguments& args) {
       const calibration::Noise& noise = made.result.noise;
       std::fprintf(stderr, "seed %llu: %.1f s, pixel %.3f slip %.2g beam %.4f\n",
                    static_cast<unsigned long long>(seeds[i]), taken.count(), noise.pixel, noise.roll.slip, noise.beam);
+      for (std::size_t k = 0; k < made.errors.size(); ++k) {
+        const calibration::Finding& finding = made.result.findings[k];
+        std::fprintf(stderr, "  %-45s %10.5f +- %.5f %s  (%.2f with %s)\n", finding.name.c_str(), made.errors[k],
+                     finding.posterior, finding.unit.c_str(), finding.correlation, finding.entangled_with.c_str());
+      }
     }
     progress.show(std::to_string(++done) + " of " + std::to_string(seeds.size()) + " vehicles");
   });
@@ -107,6 +116,8 @@ int parse_and_run(int argc, char** argv) {
   app.add_option("--calibration-error", args.calibration_error, "as in ear simulate")->capture_default_str();
   app.add_option("--duration", args.duration, "[s] stop earlier");
   app.add_option("--threads", args.threads, "the figures do not depend on it")->capture_default_str();
+  app.add_flag("--perfect-sensors", args.perfect_sensors, "what the models leave out, alone: no noise but that of the tracks");
+  app.add_option("--track-sigma", args.track_sigma, "[px]")->capture_default_str();
   app.add_flag("--verbose", args.verbose, "steps, times and noise on standard error");
   return tools::run_program(app, argc, argv, [&] { calibration_table(args); });
 }
