@@ -1,7 +1,6 @@
 #include "calibration/calibrate.h"
 
 #include <Eigen/Cholesky>
-#include <array>
 #include <cmath>
 #include <stdexcept>
 
@@ -70,18 +69,36 @@ Passed pass_until_whole(const Calibration& given, const Priors& priors, const st
   return pass(given, priors, found, applied(given, found), drives, settings);
 }
 
+Eigen::MatrixXd prior_covariance(const std::vector<Entry>& entries, const std::vector<int>& which) {
+  Eigen::VectorXd variance(static_cast<Eigen::Index>(which.size()));
+  for (std::size_t i = 0; i < which.size(); ++i) {
+    const double prior = entries[static_cast<std::size_t>(which[i])].prior;
+    variance(static_cast<Eigen::Index>(i)) = prior * prior;
+  }
+  return variance.asDiagonal();
+}
+
 /// What was not shown goes back to the given value, and what hangs on it with it: the mean of the others given these.
-void refuse(const std::vector<Entry>& entries, const std::vector<bool>& shown, const Eigen::MatrixXd& P) {
+/// They are then as uncertain as they are with what the given values may be wrong by. Returns the covariance of all.
+Eigen::MatrixXd refuse(const std::vector<Entry>& entries, const std::vector<bool>& shown, Eigen::MatrixXd P) {
   std::vector<int> kept, moved;
   for (std::size_t i = 0; i < entries.size(); ++i) (shown[i] ? moved : kept).push_back(static_cast<int>(i));
-  if (kept.empty()) return;
+  if (kept.empty()) return P;
+  const auto value = [&](int i) -> double& { return *entries[static_cast<std::size_t>(i)].value; };
   Eigen::VectorXd change(static_cast<Eigen::Index>(kept.size()));
-  for (std::size_t i = 0; i < kept.size(); ++i) change(static_cast<Eigen::Index>(i)) = -*entries[static_cast<std::size_t>(kept[i])].value;
+  for (std::size_t i = 0; i < kept.size(); ++i) change(static_cast<Eigen::Index>(i)) = -value(kept[i]);
   const Eigen::MatrixXd P_kept = P(kept, kept);
   const Eigen::MatrixXd P_cross = P(moved, kept);
-  const Eigen::VectorXd others = P_cross * P_kept.ldlt().solve(change);
-  for (std::size_t i = 0; i < moved.size(); ++i) *entries[static_cast<std::size_t>(moved[i])].value += others(static_cast<Eigen::Index>(i));
-  for (const int i : kept) *entries[static_cast<std::size_t>(i)].value = 0.0;
+  const Eigen::MatrixXd G = P_kept.ldlt().solve(P_cross.transpose()).transpose();
+  const Eigen::VectorXd others = G * change;
+  for (std::size_t i = 0; i < moved.size(); ++i) value(moved[i]) += others(static_cast<Eigen::Index>(i));
+  for (const int i : kept) value(i) = 0.0;
+  const Eigen::MatrixXd P0 = prior_covariance(entries, kept);
+  P(moved, moved) += G * (P0 - P_kept) * G.transpose();
+  P(kept, kept) = P0;
+  P(moved, kept) = G * P0;
+  P(kept, moved) = (G * P0).transpose();
+  return P;
 }
 
 void find_entangled(const std::vector<Entry>& entries, const Eigen::MatrixXd& P, std::vector<Finding>& findings) {
@@ -113,16 +130,16 @@ Result calibrate(const Calibration& given, const Priors& priors, const std::vect
     const auto k = static_cast<Eigen::Index>(i);
     shown.push_back(std::sqrt((*P)(k, k)) < settings.shown_below * entries[i].prior);
   }
-  refuse(entries, shown, *P);
+  const Eigen::MatrixXd after = refuse(entries, shown, *P);
 
   Result result;
-  result.covariance = *P;
+  result.covariance = after;
   for (std::size_t i = 0; i < entries.size(); ++i) {
     const auto k = static_cast<Eigen::Index>(i);
     const Entry& entry = entries[i];
     const double scale = std::abs(entry.scale);
     Finding finding{entry.name,        entry.unit,          entry.given,
-                    entry.scale * *entry.value, scale * entry.prior, scale * std::sqrt((*P)(k, k)),
+                    entry.scale * *entry.value, scale * entry.prior, scale * std::sqrt(after(k, k)),
                     shown[i],          "",                  0.0,
                     shown[i] ? "" : motion_that_shows(entry.name)};
     result.findings.push_back(finding);

@@ -50,7 +50,7 @@ struct Settings {
   Noise noise;
   int threads = 2;
   /// What the drives must have brought a standard deviation down to, of its prior, for a value to be changed.
-  double shown_below = 0.5;
+  double shown_below = 0.7;
   std::function<void(const std::string&)> progress;  ///< may be empty
 };
 

@@ -1,5 +1,6 @@
 #include "calibration/stated.h"
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
 #include <string>
@@ -9,8 +10,28 @@ namespace {
 
 constexpr double kDegree = 3.14159265358979323846 / 180.0;
 
-/// Root of the mean square of the standard deviations of all entries whose name begins so [unit of the findings].
-std::optional<double> sigma_of(const std::vector<Finding>& findings, const std::string& name) {
+double degrees(const std::vector<Finding>& findings, const std::string& name) {
+  return kDegree * mean_sigma(findings, name).value_or(0.0);
+}
+
+double thousandth(const std::vector<Finding>& findings, const std::string& name) {
+  return 1e-3 * mean_sigma(findings, name).value_or(0.0);
+}
+
+/// What the filter knows of the beams is what each reads too much: along it, and by the direction at a short range.
+double range_sigma(const std::vector<Finding>& findings, const LaserCalibration& lasers) {
+  constexpr double kLeast = 5e-4;  // [m]
+  double sum = 0.0;
+  for (const LaserBeam& beam : lasers.beams) {
+    const double origin = thousandth(findings, "laser0 " + beam.name + ": origin z");
+    sum += origin * origin / static_cast<double>(lasers.beams.size());
+  }
+  return std::max(kLeast, std::sqrt(sum));
+}
+
+}  // namespace
+
+std::optional<double> mean_sigma(const std::vector<Finding>& findings, const std::string& name) {
   double sum = 0.0;
   int count = 0;
   for (const Finding& finding : findings) {
@@ -22,19 +43,9 @@ std::optional<double> sigma_of(const std::vector<Finding>& findings, const std::
   return std::sqrt(sum / count);
 }
 
-double degrees(const std::vector<Finding>& findings, const std::string& name) {
-  return kDegree * sigma_of(findings, name).value_or(0.0);
-}
-
-double thousandth(const std::vector<Finding>& findings, const std::string& name) {
-  return 1e-3 * sigma_of(findings, name).value_or(0.0);
-}
-
-}  // namespace
-
 Calibration with_sigmas(Calibration calibration, const std::vector<Finding>& findings) {
   const auto lens = [&](const std::string& camera, double focal) {  // the filter counts it as a rotation
-    return sigma_of(findings, camera + ": principal point").value_or(0.0) / focal;
+    return mean_sigma(findings, camera + ": principal point").value_or(0.0) / focal;
   };
   if (!calibration.cameras.empty()) {
     calibration.cameras[0].pose_sigma =
@@ -56,6 +67,7 @@ Calibration with_sigmas(Calibration calibration, const std::vector<Finding>& fin
         std::min(thousandth(findings, "encoder0: wheel radius, left"), 1.9 * *encoder.wheel_radius_sigma);
     encoder.track_width_sigma = thousandth(findings, "encoder0: wheel separation");
   }
+  if (calibration.lasers) calibration.lasers->offset_sigma = range_sigma(findings, *calibration.lasers);
   return calibration;
 }
 

@@ -98,8 +98,9 @@ void calibration_table(const Arguments& args) {
                    static_cast<unsigned long long>(seeds[i]), taken.count(), noise.pixel, noise.roll.slip, noise.beam);
       for (std::size_t k = 0; k < made.errors.size(); ++k) {
         const calibration::Finding& finding = made.result.findings[k];
-        std::fprintf(stderr, "  %-45s %10.5f +- %.5f %s  (%.2f with %s)\n", finding.name.c_str(), made.errors[k],
-                     finding.posterior, finding.unit.c_str(), finding.correlation, finding.entangled_with.c_str());
+        std::fprintf(stderr, "  %-45s %10.5f +- %.5f %s, changed by %.5f (%.2f with %s)\n", finding.name.c_str(), made.errors[k],
+                     finding.posterior, finding.unit.c_str(), finding.change, finding.correlation,
+                     finding.entangled_with.c_str());
       }
     }
     progress.show(std::to_string(++done) + " of " + std::to_string(seeds.size()) + " vehicles");
