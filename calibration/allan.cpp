@@ -10,10 +10,13 @@
 namespace ear::calibration {
 namespace {
 
-constexpr double kShortest = 10.0;      // [s] of standing
+constexpr double kShortest = 2.0;      // [s] of standing
 constexpr double kFewestClusters = 9.0;  // of the longest averaging time
 constexpr double kSure = 3.0;           // a walk is claimed where it is this many sigmas from none
-constexpr double kWindow = 1.0;         // [s] over which standing is looked for
+constexpr double kWindow = 0.5;         // [s] over which standing is looked for
+constexpr double kTurns = 0.02;         // [rad/s] of a window's mean from the first one's
+constexpr double kTilts = 0.2;          // [m/s^2]
+constexpr double kShakes = 2.0;         // times the spread of the quietest window
 constexpr double kFirstTau = 0.02;      // [s] below, filters and digits of the sensor show
 
 double squared(double x) { return x * x; }
@@ -64,30 +67,50 @@ void fit(AllanResult& result) {
   }
 }
 
-/// First and last index of the longest stretch in which no window of a second moves.
-std::pair<std::size_t, std::size_t> longest_rest(const std::vector<ImuSample>& imu, double interval) {
-  const auto window = std::max<std::size_t>(2, static_cast<std::size_t>(kWindow / interval));
-  std::vector<Eigen::Vector3d> gyro, accel;
-  for (std::size_t i = 0; i + window <= imu.size(); i += window) {
-    Eigen::Vector3d g = Eigen::Vector3d::Zero();
-    Eigen::Vector3d a = Eigen::Vector3d::Zero();
-    for (std::size_t k = i; k < i + window; ++k) {
-      g += imu[k].gyro_B / static_cast<double>(window);
-      a += imu[k].accel_B / static_cast<double>(window);
-    }
-    gyro.push_back(g);
-    accel.push_back(a);
+/// Means and spread of half a second.
+struct Window {
+  Eigen::Vector3d gyro = Eigen::Vector3d::Zero();
+  Eigen::Vector3d accel = Eigen::Vector3d::Zero();
+  double gyro_spread = 0.0;
+};
+
+Window window_of(const std::vector<ImuSample>& imu, std::size_t from, std::size_t size) {
+  Window window;
+  const auto n = static_cast<double>(size);
+  for (std::size_t k = from; k < from + size; ++k) {
+    window.gyro += imu[k].gyro_B / n;
+    window.accel += imu[k].accel_B / n;
   }
+  double sum = 0.0;
+  for (std::size_t k = from; k < from + size; ++k) sum += (imu[k].gyro_B - window.gyro).squaredNorm() / n;
+  window.gyro_spread = std::sqrt(sum);
+  return window;
+}
+
+/// First and last index of the longest stretch that neither moves nor shakes: where rotors idle, a body is at rest, but
+/// the spread is not that of the sensor.
+std::pair<std::size_t, std::size_t> longest_rest(const std::vector<ImuSample>& imu, double interval) {
+  const auto size = std::max<std::size_t>(2, static_cast<std::size_t>(std::lround(kWindow / interval)));
+  std::vector<Window> windows;
+  for (std::size_t i = 0; i + size <= imu.size(); i += size) windows.push_back(window_of(imu, i, size));
+  if (windows.empty()) return {0, 0};
+  const auto quieter = [](const Window& a, const Window& b) { return a.gyro_spread < b.gyro_spread; };
+  const double quiet = std::min_element(windows.begin(), windows.end(), quieter)->gyro_spread;
   std::size_t best = 0, best_size = 0, begin = 0;
-  for (std::size_t i = 0; i < gyro.size(); ++i) {
-    const bool moves = (gyro[i] - gyro[begin]).norm() > 0.02 || (accel[i] - accel[begin]).norm() > 0.2;
+  for (std::size_t i = 0; i < windows.size(); ++i) {
+    const bool moves = (windows[i].gyro - windows[begin].gyro).norm() > kTurns ||
+                       (windows[i].accel - windows[begin].accel).norm() > kTilts;
     if (moves) begin = i;
+    if (windows[i].gyro_spread > kShakes * quiet) {
+      begin = i + 1;
+      continue;
+    }
     if (i + 1 - begin > best_size) {
       best = begin;
       best_size = i + 1 - begin;
     }
   }
-  return {best * window, (best + best_size) * window};
+  return {best * size, (best + best_size) * size};
 }
 
 double median_interval(const std::vector<ImuSample>& imu) {
@@ -123,8 +146,8 @@ ImuNoise noise_at_rest(const std::vector<ImuSample>& imu) {
   result.duration = static_cast<double>(to - from) * interval;
   result.rate_hz = 1.0 / interval;
   if (result.duration < kShortest) {
-    throw std::invalid_argument("it stands for " + std::to_string(result.duration) + " s at most; 10 s are needed for "
-                                "the white noise, hours for the random walk");
+    throw std::invalid_argument("it stands for " + std::to_string(result.duration) + " s at most; 2 s are needed for "
+                                "the white noise, an hour and more for the random walk");
   }
   std::vector<double> signal(to - from);
   for (int axis = 0; axis < 6; ++axis) {

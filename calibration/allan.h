@@ -40,7 +40,7 @@ struct ImuNoise {
   std::vector<AllanResult> axes;
 };
 
-/// Throws std::invalid_argument where it does not stand for 10 s at least.
+/// Throws std::invalid_argument where it does not stand for 2 s at least.
 [[nodiscard]] ImuNoise noise_at_rest(const std::vector<ImuSample>& imu);
 
 }  // namespace ear::calibration

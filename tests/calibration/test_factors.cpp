@@ -1,5 +1,6 @@
 #include "calibration/models.h"
 #include "calibration/pixel_factor.h"
+#include "smoother/feature_factor.h"
 #include "tests/smoother/support.h"
 #include "tests/support/random_drive.h"
 
@@ -120,7 +121,7 @@ TEST_CASE("calibration: derivatives of a beam, the ground's change, the origin a
 TEST_CASE("calibration: a beam meets a tilted plane where a line meets it, by other algebra") {
   std::mt19937_64 rng{9};
   for (int trial = 0; trial < 10; ++trial) {
-    const Pose T_WB{exp_so3(random_vector(rng, 0.2)), random_vector(rng, 1.0) + Eigen::Vector3d(0.0, 0.0, 2.0)};
+    const Pose T_WB{exp_so3(random_vector(rng, 0.2)), random_vector(rng, 1.0) + Eigen::Vector3d(0.0, 0.0, 8.0)};
     const Eigen::VectorXd ground = small(rng, 3, 0.1);
     BeamModel beam;
     beam.p_BL = random_vector(rng, 0.1);
@@ -128,7 +129,7 @@ TEST_CASE("calibration: a beam meets a tilted plane where a line meets it, by ot
     beam.tilt = tangent_basis(-beam.d_B);
     beam.centre = {0.3, -0.4};
     const Eigen::Vector3d from = T_WB.p + T_WB.R * beam.p_BL, along = T_WB.R * beam.d_B;
-    double low = 0.0, high = 20.0;  // bisection: above the plane, and below it
+    double low = 0.0, high = 60.0;  // bisection: above the plane, and below it
     for (int i = 0; i < 80; ++i) {
       const double middle = 0.5 * (low + high);
       const Eigen::Vector3d hit = from + middle * along;
