@@ -14,6 +14,7 @@ constexpr double kShortest = 2.0;      // [s] of standing
 constexpr double kFewestClusters = 9.0;  // of the longest averaging time
 constexpr double kSure = 3.0;           // a walk is claimed where it is this many sigmas from none
 constexpr double kWindow = 0.5;         // [s] over which standing is looked for
+constexpr double kOverlap = 1.4;         // neighbouring averaging times see the same noise
 constexpr double kTurns = 0.02;         // [rad/s] of a window's mean from the first one's
 constexpr double kTilts = 0.2;          // [m/s^2]
 constexpr double kShakes = 2.0;         // times the spread of the quietest window
@@ -132,7 +133,7 @@ AllanResult allan(const std::vector<double>& signal, double interval) {
   for (std::size_t m = 1; kFewestClusters * static_cast<double>(m) <= static_cast<double>(signal.size()); m *= 2) {
     const double freedom = std::max(1.0, degrees_of_freedom(signal.size(), m));
     result.points.push_back({static_cast<double>(m) * interval, std::sqrt(allan_variance(sum, m)),
-                             1.0 / std::sqrt(2.0 * freedom)});
+                             kOverlap / std::sqrt(2.0 * freedom)});
   }
   fit(result);
   return result;
