@@ -10,15 +10,15 @@
 namespace ear::calibration {
 namespace {
 
-constexpr double kShortest = 2.0;      // [s] of standing
+constexpr double kShortest = 2.0;        // [s] of standing
 constexpr double kFewestClusters = 9.0;  // of the longest averaging time
-constexpr double kSure = 3.0;           // a walk is claimed where it is this many sigmas from none
-constexpr double kWindow = 0.5;         // [s] over which standing is looked for
+constexpr double kSure = 3.0;            // a walk is claimed where it is this many sigmas from none
+constexpr double kWindow = 0.5;          // [s] over which standing is looked for
 constexpr double kOverlap = 1.4;         // neighbouring averaging times see the same noise
-constexpr double kTurns = 0.02;         // [rad/s] of a window's mean from the first one's
-constexpr double kTilts = 0.2;          // [m/s^2]
-constexpr double kShakes = 2.0;         // times the spread of the quietest window
-constexpr double kFirstTau = 0.02;      // [s] below, filters and digits of the sensor show
+constexpr double kTurns = 0.02;          // [rad/s] of a window's mean from the first one's
+constexpr double kTilts = 0.2;           // [m/s^2]
+constexpr double kShakes = 2.0;          // times the spread of the quietest window
+constexpr double kFirstTau = 0.02;       // [s] below, filters and digits of the sensor show
 
 double squared(double x) { return x * x; }
 
@@ -132,8 +132,8 @@ AllanResult allan(const std::vector<double>& signal, double interval) {
   for (const double value : signal) sum.push_back(sum.back() + value - mean);
   for (std::size_t m = 1; kFewestClusters * static_cast<double>(m) <= static_cast<double>(signal.size()); m *= 2) {
     const double freedom = std::max(1.0, degrees_of_freedom(signal.size(), m));
-    result.points.push_back({static_cast<double>(m) * interval, std::sqrt(allan_variance(sum, m)),
-                             kOverlap / std::sqrt(2.0 * freedom)});
+    result.points.push_back(
+        {static_cast<double>(m) * interval, std::sqrt(allan_variance(sum, m)), kOverlap / std::sqrt(2.0 * freedom)});
   }
   fit(result);
   return result;
@@ -147,7 +147,8 @@ ImuNoise noise_at_rest(const std::vector<ImuSample>& imu) {
   result.duration = static_cast<double>(to - from) * interval;
   result.rate_hz = 1.0 / interval;
   if (result.duration < kShortest) {
-    throw std::invalid_argument("it stands for " + std::to_string(result.duration) + " s at most; 2 s are needed for "
+    throw std::invalid_argument("it stands for " + std::to_string(result.duration) +
+                                " s at most; 2 s are needed for "
                                 "the white noise, an hour and more for the random walk");
   }
   std::vector<double> signal(to - from);

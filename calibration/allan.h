@@ -1,5 +1,5 @@
-// The noise of an inertial sensor from a recording of it at rest: Allan deviation (IEEE Std 952), white noise and random
-// walk, each with its uncertainty.
+// The noise of an inertial sensor from a recording of it at rest: Allan deviation (IEEE Std 952), white noise and
+// random walk, each with its uncertainty.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,8 +12,8 @@ namespace ear::calibration {
 
 /// Overlapping Allan deviation at one averaging time.
 struct AllanPoint {
-  double tau = 0.0;        ///< [s]
-  double deviation = 0.0;  ///< [unit of the signal]
+  double tau = 0.0;             ///< [s]
+  double deviation = 0.0;       ///< [unit of the signal]
   double relative_sigma = 0.0;  ///< of the deviation: 1 / sqrt(2 degrees of freedom)
 };
 
@@ -27,7 +27,7 @@ struct AllanResult {
   std::vector<AllanPoint> points;
   std::optional<Measured> white;        ///< density [unit/sqrt(Hz)]
   std::optional<Measured> random_walk;  ///< density [unit/s/sqrt(Hz)]; nothing where the length cannot tell
-  double walk_below = 0.0;  ///< where it cannot: what it is below, with 97.5 % probability
+  double walk_below = 0.0;              ///< where it cannot: what it is below, with 97.5 % probability
 };
 
 /// Of one axis, evenly sampled at `interval` seconds.

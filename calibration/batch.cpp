@@ -17,11 +17,12 @@ namespace {
 constexpr double kPixelHuber = 2.5;  // [sigma]
 constexpr double kRollHuber = 4.0;
 constexpr double kBeamHuber = 3.0;
-constexpr double kGyroBias = 0.1;  // [rad/s] where nothing is stated
+constexpr double kGyroBias = 0.1;   // [rad/s] where nothing is stated
 constexpr double kAccelBias = 0.5;  // [m/s^2]
 constexpr double kWildPixel = 8.0;  // [sigma] of both coordinates: the feature is used no more
 constexpr double kConverged = 1e-8;
-constexpr double kRegion = 1e14;  // nearly Gauss-Newton: damping would hold the scale, which is shown weakly, where it is
+constexpr double kRegion =
+    1e14;  // nearly Gauss-Newton: damping would hold the scale, which is shown weakly, where it is
 
 Pose to_pose(const Eigen::Isometry3d& T) { return {T.linear(), T.translation()}; }
 
@@ -51,7 +52,6 @@ class ProgressCallback final : public ceres::IterationCallback {
 
 Batch::Batch(const Calibration& given, const Priors& priors, const Parameters& start, const Noise& noise)
     : given_(given),
-      priors_(priors),
       noise_(noise),
       cameras_(given_cameras(given)),
       parameters_(start),
@@ -73,7 +73,7 @@ CameraState Batch::cameras_now() const {
 }
 
 ceres::ResidualBlockId Batch::add_term(TermBlock term, ceres::CostFunction* cost, ceres::LossFunction* loss,
-                                  const std::vector<double*>& blocks) {
+                                       const std::vector<double*>& blocks) {
   term.id = problem_->AddResidualBlock(cost, loss, blocks);
   terms_.push_back(term);
   return term.id;
@@ -128,7 +128,8 @@ void Batch::add_priors() {
   for (Segment& segment : segments_) {
     Keyframe& first = segment.keyframes.front();
     const NavState state = state_of(first);
-    add_term({}, new OriginFactor(OriginModel{{state.q_WB.toRotationMatrix(), state.p_WB}}), nullptr, {first.pose.data()});
+    add_term({}, new OriginFactor(OriginModel{{state.q_WB.toRotationMatrix(), state.p_WB}}), nullptr,
+             {first.pose.data()});
     const BiasModel bias{given_.imu.gyro_bias_sigma.value_or(kGyroBias),
                          given_.imu.accel_bias_sigma.value_or(kAccelBias)};
     add_term({}, new BiasFactor(bias), nullptr, {first.motion.data()});
@@ -142,7 +143,7 @@ void Batch::add_inertial(std::size_t s) {
     Keyframe& b = keyframes[i + 1];
     const auto measured = preintegrated(a.since, state_of(a), given_.imu);
     add_term({Term::inertial, nullptr, s, i, 0, a.t_ns}, new smoother::ImuFactor(measured), nullptr,
-        {a.pose.data(), a.motion.data(), b.pose.data(), b.motion.data()});
+             {a.pose.data(), a.motion.data(), b.pose.data(), b.motion.data()});
   }
 }
 
@@ -162,8 +163,8 @@ void Batch::add_rolls(std::size_t s) {
     const auto roll = roll_along(a.path, state.b_g, n_k, angles, setting);
     if (!roll) continue;
     add_term({Term::roll, nullptr, s, i, 0, a.t_ns}, new RollFactor(*roll), new ceres::HuberLoss(kRollHuber),
-        {a.pose.data(), b.pose.data(), a.motion.data(), parameters_.wheels.data(), parameters_.axle.data(),
-         parameters_.encoder_time.data()});
+             {a.pose.data(), b.pose.data(), a.motion.data(), parameters_.wheels.data(), parameters_.axle.data(),
+              parameters_.encoder_time.data()});
   }
 }
 
@@ -174,15 +175,15 @@ void Batch::add_ground(std::size_t s) {
     Keyframe& a = keyframes[i];
     if (a.on_ground) {
       add_term({Term::stand, nullptr, s, i, 0, a.t_ns}, new StandFactor(StandModel{given, a.centre, noise_.stand}),
-          new ceres::HuberLoss(kBeamHuber),
-          {a.pose.data(), a.ground.data(), parameters_.wheels.data(), parameters_.axle.data()});
+               new ceres::HuberLoss(kBeamHuber),
+               {a.pose.data(), a.ground.data(), parameters_.wheels.data(), parameters_.axle.data()});
     }
     if (i + 1 == keyframes.size()) continue;
     Keyframe& b = keyframes[i + 1];
     const double way = std::sqrt(std::hypot(b.centre.x - a.centre.x, b.centre.y - a.centre.y) + 1e-4);
     add_term({Term::ground, nullptr, s, i, 0, a.t_ns},
-        new GroundFactor(GroundModel{a.centre, b.centre, noise_.ground_height * way, noise_.ground_slope * way}), nullptr,
-        {a.ground.data(), b.ground.data()});
+             new GroundFactor(GroundModel{a.centre, b.centre, noise_.ground_height * way, noise_.ground_slope * way}),
+             nullptr, {a.ground.data(), b.ground.data()});
   }
 }
 
@@ -199,9 +200,9 @@ void Batch::add_beams(std::size_t s, double gate) {
       const double range = sample.range[k];
       if (!(range >= lasers.range_min && range <= lasers.range_max)) continue;
       const LaserBeam& beam = lasers.beams[k];
-      auto cost = std::make_unique<BeamFactor>(
-          BeamModel{beam.p_BL, beam.d_B, tangent_basis(-beam.d_B), keyframe.centre, node.R_kt, node.p_kt, node.v_kt,
-                    node.rate_B, range, noise_.beam});
+      auto cost =
+          std::make_unique<BeamFactor>(BeamModel{beam.p_BL, beam.d_B, tangent_basis(-beam.d_B), keyframe.centre,
+                                                 node.R_kt, node.p_kt, node.v_kt, node.rate_B, range, noise_.beam});
       const std::vector<double*> blocks{keyframe.pose.data(), keyframe.ground.data(), parameters_.beams[k].data(),
                                         parameters_.laser_time.data()};
       double residual = 0.0;
@@ -224,13 +225,13 @@ void Batch::add_points(std::size_t s) {
       PixelObservation observation{seen.left_px, noise_.pixel, keyframe.late, keyframe.rate_B, v_B};
       const TermBlock term{Term::pixel, nullptr, s, p, 0, keyframe.t_ns};
       add_term(term, new LeftPixel(observation, cameras_, point.anchor), new ceres::HuberLoss(kPixelHuber),
-          {keyframe.pose.data(), parameters_.camera.data(), parameters_.lens[0].data(), parameters_.camera_time.data(),
-           point.block.data()});
+               {keyframe.pose.data(), parameters_.camera.data(), parameters_.lens[0].data(),
+                parameters_.camera_time.data(), point.block.data()});
       if (!seen.has_right) continue;
       observation.px = seen.right_px;
       add_term(term, new RightPixel(observation, cameras_, point.anchor), new ceres::HuberLoss(kPixelHuber),
-          {keyframe.pose.data(), parameters_.camera.data(), parameters_.stereo.data(), parameters_.lens[1].data(),
-           parameters_.camera_time.data(), point.block.data()});
+               {keyframe.pose.data(), parameters_.camera.data(), parameters_.stereo.data(), parameters_.lens[1].data(),
+                parameters_.camera_time.data(), point.block.data()});
     }
   }
 }
@@ -244,40 +245,13 @@ void Batch::add_reference(std::size_t s) {
     if (position.t_ns < keyframe.t_ns || keyframe.path.empty() || position.t_ns > keyframe.path.back().t_ns) continue;
     const ReferenceModel model{position.p, at(keyframe.path, position.t_ns).p_kt, segment.drive->reference_sigma};
     add_term({Term::reference, nullptr, s, i, 0, position.t_ns}, new ReferenceFactor(model), new ceres::HuberLoss(3.0),
-        {keyframe.pose.data(), segment.reference.data()});
+             {keyframe.pose.data(), segment.reference.data()});
   }
 }
 
 void Batch::learn_noise() {
-  std::vector<double> pixels, beams;
-  std::array<double, 3> residual{};
-  double used = 0.0;
-  std::size_t begin = 0;
-  const auto length = [&](const TermBlock& term) {
-    problem_->EvaluateResidualBlock(term.id, false, nullptr, residual.data(), nullptr);
-    return std::hypot(residual[0], residual[1]);
-  };
-  for (std::size_t i = 0; i < terms_.size(); ++i) {
-    const TermBlock& term = terms_[i];
-    if (term.kind == Term::beam) {
-      problem_->EvaluateResidualBlock(term.id, false, nullptr, residual.data(), nullptr);
-      beams.push_back(residual[0]);
-    }
-    if (term.kind != Term::pixel) continue;
-    if (terms_[begin].kind != Term::pixel || terms_[begin].keyframe != term.keyframe ||
-        terms_[begin].segment != term.segment) {
-      begin = i;
-      used += 3.0;
-    }
-    if (length(term) > kWildPixel) segments_[term.segment].points[term.keyframe].seen.clear();
-    pixels.push_back(residual[0]);
-    pixels.push_back(residual[1]);
-  }
-  if (!pixels.empty()) {
-    const auto rows = static_cast<double>(pixels.size());
-    noise_.pixel *= robust_sigma(pixels) * std::sqrt(rows / std::max(1.0, rows - used));
-  }
-  if (!beams.empty()) noise_.beam = std::max(0.5 * given_.lasers->noise, noise_.beam * robust_sigma(beams));
+  learn_from_pixels();
+  learn_from_beams();
   if (!given_.encoder) return;
   const RollSetting setting{*given_.encoder, given_.imu, odometer_of(*given_.encoder),
                             odometer_of(*applied(given_, parameters_).encoder), noise_.roll};
@@ -287,6 +261,38 @@ void Batch::learn_noise() {
     slip = std::max(slip, slip_of(segment, setting).value_or(0.0));
   }
   if (slip > 0.0) noise_.roll = {slip, 2.0 * slip};
+}
+
+void Batch::learn_from_pixels() {
+  std::vector<double> residuals;
+  std::array<double, 2> residual{};
+  double used = 0.0;  // rows that place the points
+  const TermBlock* before = nullptr;
+  for (const TermBlock& term : terms_) {
+    if (term.kind != Term::pixel) continue;
+    const bool same = before != nullptr && before->keyframe == term.keyframe && before->segment == term.segment;
+    if (!same) used += 3.0;
+    before = &term;
+    problem_->EvaluateResidualBlock(term.id, false, nullptr, residual.data(), nullptr);
+    if (std::hypot(residual[0], residual[1]) > kWildPixel) {
+      segments_[term.segment].points[term.keyframe].seen.clear();
+    }
+    residuals.insert(residuals.end(), residual.begin(), residual.end());
+  }
+  if (residuals.empty()) return;
+  const auto rows = static_cast<double>(residuals.size());
+  noise_.pixel *= robust_sigma(residuals) * std::sqrt(rows / std::max(1.0, rows - used));
+}
+
+void Batch::learn_from_beams() {
+  std::vector<double> residuals;
+  for (const TermBlock& term : terms_) {
+    if (term.kind != Term::beam) continue;
+    double residual = 0.0;
+    problem_->EvaluateResidualBlock(term.id, false, nullptr, &residual, nullptr);
+    residuals.push_back(residual);
+  }
+  if (!residuals.empty()) noise_.beam = std::max(0.5 * given_.lasers->noise, noise_.beam * robust_sigma(residuals));
 }
 
 bool Batch::solve(int iterations, int threads, const Progress& progress) {
@@ -315,20 +321,20 @@ bool Batch::solve(int iterations, int threads, const Progress& progress) {
   return summary.IsSolutionUsable() && std::isfinite(summary.final_cost);
 }
 
-std::vector<double*> Batch::elimination_order() const {
+std::vector<double*> Batch::elimination_order() {
   std::vector<double*> order;
-  for (const Segment& segment : segments_) {
-    for (const Point& point : segment.points) {
-      if (point.used) order.push_back(const_cast<double*>(point.block.data()));
+  for (Segment& segment : segments_) {
+    for (Point& point : segment.points) {
+      if (point.used) order.push_back(point.block.data());
     }
   }
-  for (const Segment& segment : segments_) {
-    for (const Keyframe& keyframe : segment.keyframes) {
-      order.push_back(const_cast<double*>(keyframe.pose.data()));
-      order.push_back(const_cast<double*>(keyframe.motion.data()));
-      if (given_.encoder) order.push_back(const_cast<double*>(keyframe.ground.data()));
+  for (Segment& segment : segments_) {
+    for (Keyframe& keyframe : segment.keyframes) {
+      order.push_back(keyframe.pose.data());
+      order.push_back(keyframe.motion.data());
+      if (given_.encoder) order.push_back(keyframe.ground.data());
     }
-    if (!segment.drive->reference.empty()) order.push_back(const_cast<double*>(segment.reference.data()));
+    if (!segment.drive->reference.empty()) order.push_back(segment.reference.data());
   }
   for (const ParameterBlock& block : blocks_) order.push_back(block.data);
   return order;

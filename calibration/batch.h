@@ -19,10 +19,10 @@ namespace ear::calibration {
 struct Noise {
   double pixel = 0.6;  ///< [px]
   RollNoise roll;
-  double beam = 0.004;         ///< [m]
-  double stand = 1e-3;         ///< [m] of the wheels' lowest points from the plane
+  double beam = 0.004;          ///< [m]
+  double stand = 1e-3;          ///< [m] of the wheels' lowest points from the plane
   double ground_height = 3e-3;  ///< how the ground's plane changes [m/sqrt(m)]
-  double ground_slope = 0.02;  ///< [rad/sqrt(m)]
+  double ground_slope = 0.02;   ///< [rad/sqrt(m)]
 };
 
 /// What kind of term a residual block belongs to.
@@ -64,7 +64,7 @@ class Batch {
   [[nodiscard]] const std::vector<TermBlock>& terms() const { return terms_; }
   [[nodiscard]] ceres::Problem& problem() { return *problem_; }
   /// Blocks in the order of elimination: points, then frames in the order of time, then parameters.
-  [[nodiscard]] std::vector<double*> elimination_order() const;
+  [[nodiscard]] std::vector<double*> elimination_order();
 
  private:
   void add_blocks();
@@ -77,10 +77,11 @@ class Batch {
   void add_reference(std::size_t segment);
   ceres::ResidualBlockId add_term(TermBlock term, ceres::CostFunction* cost, ceres::LossFunction* loss,
                                   const std::vector<double*>& blocks);
+  void learn_from_pixels();
+  void learn_from_beams();
   [[nodiscard]] CameraState cameras_now() const;
 
   Calibration given_;
-  Priors priors_;
   Noise noise_;
   GivenCameras cameras_;
   Parameters parameters_;

@@ -11,11 +11,11 @@
 namespace ear::calibration {
 namespace {
 
-constexpr double kGate = 6.0;      // [sigma] of beams, once there is a solution
-constexpr int kFirst = 12;         // iterations
+constexpr double kGate = 6.0;  // [sigma] of beams, once there is a solution
+constexpr int kFirst = 12;     // iterations
 constexpr int kNext = 6;
 constexpr int kRounds = 3;
-constexpr double kLeftOut = 4.0;   // [s] of a drive: standing before the start
+constexpr double kLeftOut = 4.0;  // [s] of a drive: standing before the start
 
 std::vector<Entry> all_entries(const std::vector<ParameterBlock>& blocks) {
   std::vector<Entry> entries;
@@ -34,8 +34,9 @@ void minimise(Batch& batch, const Settings& settings) {
                         std::to_string(iteration) + ": " + std::to_string(cost));
     };
     if (!batch.solve(round == 0 ? kFirst : kNext, settings.threads, told)) {
-      throw std::runtime_error("no minimum found: the sensors contradict each other, or the calibration given is too "
-                               "far off");
+      throw std::runtime_error(
+          "no minimum found: the sensors contradict each other, or the calibration given is too "
+          "far off");
     }
     if (round + 1 < kRounds) batch.learn_noise();
   }
@@ -138,9 +139,15 @@ Result calibrate(const Calibration& given, const Priors& priors, const std::vect
     const auto k = static_cast<Eigen::Index>(i);
     const Entry& entry = entries[i];
     const double scale = std::abs(entry.scale);
-    Finding finding{entry.name,        entry.unit,          entry.given,
-                    entry.scale * *entry.value, scale * entry.prior, scale * std::sqrt(after(k, k)),
-                    shown[i],          "",                  0.0,
+    Finding finding{entry.name,
+                    entry.unit,
+                    entry.given,
+                    entry.scale * *entry.value,
+                    scale * entry.prior,
+                    scale * std::sqrt(after(k, k)),
+                    shown[i],
+                    "",
+                    0.0,
                     shown[i] ? "" : motion_that_shows(entry.name)};
     result.findings.push_back(finding);
   }

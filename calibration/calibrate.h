@@ -15,10 +15,10 @@ struct Finding {
   std::string name;  ///< "encoder0: wheel radius, mean"
   std::string unit;  ///< of all that follows
   double given = 0.0;
-  double change = 0.0;     ///< calibrated less given; 0 where the given value stays
-  double prior = 0.0;      ///< standard deviation before
-  double posterior = 0.0;  ///< standard deviation after
-  bool shown = true;       ///< false: the drives did not show it, and the given value stays
+  double change = 0.0;         ///< calibrated less given; 0 where the given value stays
+  double prior = 0.0;          ///< standard deviation before
+  double posterior = 0.0;      ///< standard deviation after
+  bool shown = true;           ///< false: the drives did not show it, and the given value stays
   std::string entangled_with;  ///< the entry of the largest correlation
   double correlation = 0.0;    ///< of it
   std::string motion_wanted;   ///< what would show it; empty where it was shown
@@ -36,8 +36,8 @@ struct SensorFit {
 struct Result {
   Calibration calibration;  ///< with the standard deviations stated
   Parameters parameters;
-  std::vector<Finding> findings;       ///< in the order of blocks_of()
-  Eigen::MatrixXd covariance;          ///< in the units of Parameters
+  std::vector<Finding> findings;  ///< in the order of blocks_of()
+  Eigen::MatrixXd covariance;     ///< in the units of Parameters
   Noise noise;
   std::vector<SensorFit> fits;
   double encoder_time = 0.0, laser_time = 0.0;  ///< [s] to add to the stamps

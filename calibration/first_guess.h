@@ -23,8 +23,9 @@ struct FirstGuess {
 };
 
 /// `given`: whose lens the features were seen through; `now`: the calibration at hand, its standard deviations stated.
-/// From the cameras alone where there are any, for wheels and beams that are not yet calibrated would mislead it. States
-/// are `interval` seconds apart. Throws std::invalid_argument, naming the drive, where hardly anything is estimated.
+/// From the cameras alone where there are any, for wheels and beams that are not yet calibrated would mislead it.
+/// States are `interval` seconds apart. Throws std::invalid_argument, naming the drive, where hardly anything is
+/// estimated.
 [[nodiscard]] FirstGuess guess_motion(const Drive& drive, const Calibration& given, const Calibration& now,
                                       const FilterConfig& config, double interval);
 

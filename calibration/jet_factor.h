@@ -24,9 +24,7 @@ template <typename T>
 struct BlockValues {
   std::array<T, 12> v{};  ///< of a pose: rotation row by row, position
 
-  [[nodiscard]] Matrix3<T> R() const {
-    return Eigen::Map<const Eigen::Matrix<T, 3, 3, Eigen::RowMajor>>(v.data());
-  }
+  [[nodiscard]] Matrix3<T> R() const { return Eigen::Map<const Eigen::Matrix<T, 3, 3, Eigen::RowMajor>>(v.data()); }
   [[nodiscard]] Vector3<T> p() const { return Eigen::Map<const Vector3<T>>(v.data() + 9); }
   [[nodiscard]] Vector3<T> vector3(std::size_t first) const { return {v[first], v[first + 1], v[first + 2]}; }
 };

@@ -38,13 +38,13 @@ template <typename T>
 /// Residuals: left, right, and along the axle [m], whitened.
 struct RollModel {
   OdometerState given;
-  Eigen::Vector2d angle = Eigen::Vector2d::Zero();      ///< that the wheels turned, left and right [rad]
+  Eigen::Vector2d angle = Eigen::Vector2d::Zero();         ///< that the wheels turned, left and right [rad]
   Eigen::Vector2d speed_gained = Eigen::Vector2d::Zero();  ///< of their turning from i to j [rad/s]
-  Eigen::Vector3d turned = Eigen::Vector3d::Zero();     ///< integral of the measured rate [rad]
-  double duration = 0.0;                                ///< [s]
-  std::array<Eigen::Vector3d, 2> along;                 ///< direction of each wheel's path, in the body at i
-  Eigen::Matrix3d R_im = Eigen::Matrix3d::Identity();   ///< from the body in the middle of the path to that at i
-  Eigen::Vector3d bend = Eigen::Vector3d::Zero();       ///< path less chord, as the residuals [m]
+  Eigen::Vector3d turned = Eigen::Vector3d::Zero();        ///< integral of the measured rate [rad]
+  double duration = 0.0;                                   ///< [s]
+  std::array<Eigen::Vector3d, 2> along;                    ///< direction of each wheel's path, in the body at i
+  Eigen::Matrix3d R_im = Eigen::Matrix3d::Identity();      ///< from the body in the middle of the path to that at i
+  Eigen::Vector3d bend = Eigen::Vector3d::Zero();          ///< path less chord, as the residuals [m]
   Eigen::Matrix3d whitening = Eigen::Matrix3d::Identity();
 
   template <typename T>
@@ -101,8 +101,7 @@ struct BeamModel {
     const Vector3<T> direction = (d + tilted.cross(d)).normalized();  // as in applied()
     const Vector3<T> turn = rate_B.cast<T>() * late;
     const auto to_keyframe = [&](const Vector3<T>& v) -> Vector3<T> { return R_kt.cast<T>() * (v + turn.cross(v)); };
-    const Vector3<T> p_k =
-        p_kt.cast<T>() + v_kt.cast<T>() * late + to_keyframe(p_BL.cast<T>() + blocks[2].vector3(0));
+    const Vector3<T> p_k = p_kt.cast<T>() + v_kt.cast<T>() * late + to_keyframe(p_BL.cast<T>() + blocks[2].vector3(0));
     const Matrix3<T> R_Wk = blocks[0].R();
     const Vector3<T> p_W = blocks[0].p() + R_Wk * p_k;
     const Vector3<T> d_W = R_Wk * to_keyframe(direction);
@@ -185,7 +184,7 @@ struct BiasModel {
 struct ReferenceModel {
   Eigen::Vector3d p = Eigen::Vector3d::Zero();     ///< measured [m]
   Eigen::Vector3d p_kt = Eigen::Vector3d::Zero();  ///< the body at its time, in that at the keyframe
-  double sigma = 1.0;                             ///< [m]
+  double sigma = 1.0;                              ///< [m]
 
   template <typename T>
   void operator()(const std::array<BlockValues<T>, 2>& blocks, T* residual) const {

@@ -6,9 +6,9 @@
 namespace ear::calibration {
 namespace {
 
-constexpr double kShortest = 0.02;      // [m] of both wheels together
-constexpr std::size_t kFewest = 30;     // intervals
-constexpr double kLeast = 1e-4;         // [m/sqrt(m)]
+constexpr double kShortest = 0.02;   // [m] of both wheels together
+constexpr std::size_t kFewest = 30;  // intervals
+constexpr double kLeast = 1e-4;      // [m/sqrt(m)]
 constexpr double kMedianToSigma = 1.4826;
 constexpr double kTwoPi = 6.283185307179586;
 
@@ -18,12 +18,18 @@ double median(std::vector<double>& values) {
   return *middle;
 }
 
-/// About the ground's normal, by the gyroscope [rad].
-double turned_about(const std::vector<PathNode>& path, const Eigen::Vector3d& n_k) {
-  double turned = 0.0;
+/// Integrals of the rate over a path: about the ground's normal, and about the axle [rad].
+struct Turned {
+  double yaw = 0.0;
+  double pitch = 0.0;
+};
+
+Turned turned_along(const std::vector<PathNode>& path, const Eigen::Vector3d& n_k, const Eigen::Vector3d& y_B) {
+  Turned turned;
   for (std::size_t i = 0; i + 1 < path.size(); ++i) {
     const double dt = seconds_between(path[i].t_ns, path[i + 1].t_ns);
-    turned += dt * n_k.dot(path[i].R_kt * path[i].rate_B);
+    turned.yaw += dt * n_k.dot(path[i].R_kt * path[i].rate_B);
+    turned.pitch += dt * y_B.dot(path[i].rate_B);
   }
   return turned;
 }
@@ -48,18 +54,13 @@ std::optional<double> slip_of(const Segment& segment, const RollSetting& setting
     const auto to = angles.angle(keyframe.path.back().t_ns);
     if (!from || !to) continue;
     const double duration = seconds_between(keyframe.t_ns, keyframe.path.back().t_ns);
-    const NavState state = state_of(keyframe);
     const Eigen::Vector3d n_W = Eigen::Vector3d(-keyframe.ground[1], -keyframe.ground[2], 1.0).normalized();
-    const Eigen::Vector3d n_k = state.q_WB.conjugate() * n_W;
-    Eigen::Vector3d rates = Eigen::Vector3d::Zero();
-    for (std::size_t i = 0; i + 1 < keyframe.path.size(); ++i) {
-      rates += keyframe.path[i].rate_B * seconds_between(keyframe.path[i].t_ns, keyframe.path[i + 1].t_ns);
-    }
-    const double pitched = now.T_BO.R.col(1).dot(rates);
-    const Eigen::Vector2d rolled = now.wheel_radius.cwiseProduct(*to - *from + Eigen::Vector2d::Constant(pitched));
+    const Eigen::Vector3d n_k = state_of(keyframe).q_WB.conjugate() * n_W;
+    const Turned turned = turned_along(keyframe.path, n_k, now.T_BO.R.col(1));
+    const Eigen::Vector2d rolled = now.wheel_radius.cwiseProduct(*to - *from + Eigen::Vector2d::Constant(turned.pitch));
     const double way = rolled.cwiseAbs().sum();
     if (way < kShortest) continue;
-    const double yaw = now.track_width * turned_about(keyframe.path, n_k);
+    const double yaw = now.track_width * turned.yaw;
     errors.push_back((rolled(1) - rolled(0) - yaw) / std::sqrt(way));
     const double gyro = now.track_width * setting.imu.gyro_noise;
     known.push_back((gyro * gyro * duration + read * read) / way);

@@ -17,14 +17,14 @@ struct Parameters {
   std::array<double, 6> stereo{};  ///< the same of camera 1 in camera 0
   /// Of each camera: focal length (relative), principal point [px], k1, k2.
   std::array<std::array<double, 5>, 2> lens{};
-  std::array<double, 1> camera_time{};     ///< [s] added to the stamps
-  std::array<double, 3> wheels{};          ///< mean radius, left less right radius, track width; relative
+  std::array<double, 1> camera_time{};  ///< [s] added to the stamps
+  std::array<double, 3> wheels{};       ///< mean radius, left less right radius, track width; relative
   /// Position of O [m]; turn of O about its own x and z, tangents: y_O = (-z, 1, x) normalized.
   std::array<double, 5> axle{};
-  std::array<double, 1> encoder_time{};    ///< [s] added to the stamps
+  std::array<double, 1> encoder_time{};  ///< [s] added to the stamps
   /// Origin [m]; tilt t of the direction, tangents: d = (d^ + (B t) x d^) normalized, B = tangent_basis(-d^).
   std::vector<std::array<double, 5>> beams;
-  std::array<double, 1> laser_time{};      ///< [s] added to the stamps
+  std::array<double, 1> laser_time{};  ///< [s] added to the stamps
 };
 
 /// What the values were known to before, as standard deviations, in the units of Parameters.

@@ -63,8 +63,7 @@ Prediction predict(const PixelObservation& seen, const GivenCameras& given, cons
   cameras.T_BC0 = with_error(given.poses.T_BC0, b.camera);
   if (b.stereo != nullptr) cameras.T_C0C1 = with_error(given.poses.T_C0C1, b.stereo);
   const InverseDepthPoint feature = smoother::with_values(anchor, b.point);
-  const LinearizedObservation z =
-      linearize_observation({R_WS, p_WS}, cameras, which, feature, Eigen::Vector2d::Zero());
+  const LinearizedObservation z = linearize_observation({R_WS, p_WS}, cameras, which, feature, Eigen::Vector2d::Zero());
 
   Prediction result;
   const Projected pixel = project(given.lens[static_cast<std::size_t>(which)], b.lens, -z.residual);

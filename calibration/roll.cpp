@@ -6,8 +6,8 @@
 namespace ear::calibration {
 namespace {
 
-constexpr double kSlow = 0.15;         // [m/s] below, the direction is that of the axle and the ground
-constexpr double kFloor = 2e-5;        // [m] of any path: roundness, play, interpolation of the readings
+constexpr double kSlow = 0.15;   // [m/s] below, the direction is that of the axle and the ground
+constexpr double kFloor = 2e-5;  // [m] of any path: roundness, play, interpolation of the readings
 constexpr double kTwoPi = 6.283185307179586;
 
 /// One point of the axle along the path.
@@ -59,7 +59,8 @@ double sideways(const std::vector<PathNode>& path, const Eigen::Vector3d& lever,
 Eigen::Matrix3d whitening(const RollSetting& setting, const Eigen::Vector2d& rolled, double way, double duration) {
   const double r = setting.now.wheel_radius.mean();
   const double count = kTwoPi / static_cast<double>(setting.encoder.resolution) * r;
-  const double read = std::sqrt(2.0 * (setting.encoder.noise_counts * setting.encoder.noise_counts + 1.0 / 12.0)) * count;
+  const double read =
+      std::sqrt(2.0 * (setting.encoder.noise_counts * setting.encoder.noise_counts + 1.0 / 12.0)) * count;
   const double pitch = r * setting.imu.gyro_noise * std::sqrt(duration);
   const RollNoise& noise = setting.noise;
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
@@ -82,8 +83,7 @@ OdometerState odometer_of(const EncoderCalibration& encoder) {
 }
 
 std::optional<RollModel> roll_along(const std::vector<PathNode>& path, const Eigen::Vector3d& b_g,
-                                    const Eigen::Vector3d& n_k, const WheelAngles& angles,
-                                    const RollSetting& setting) {
+                                    const Eigen::Vector3d& n_k, const WheelAngles& angles, const RollSetting& setting) {
   if (path.size() < 2) return std::nullopt;
   const TimeNs from_ns = path.front().t_ns;
   const TimeNs to_ns = path.back().t_ns;

@@ -22,10 +22,10 @@ struct Keyframe {
   smoother::MotionBlock motion{};
   std::array<double, 3> ground{};
   GroundCentre centre;
-  bool on_ground = true;  ///< the wheels carry the vehicle, here and on the way to the next
+  bool on_ground = true;                             ///< the wheels carry the vehicle, here and on the way to the next
   Eigen::Vector3d rate_B = Eigen::Vector3d::Zero();  ///< bias removed [rad/s]
-  std::vector<InertialPiece> since;  ///< from here to the next keyframe; of the last one empty
-  std::vector<PathNode> path;        ///< the same, by the present state
+  std::vector<InertialPiece> since;                  ///< from here to the next keyframe; of the last one empty
+  std::vector<PathNode> path;                        ///< the same, by the present state
 };
 
 /// An observation by one keyframe.
@@ -54,7 +54,7 @@ struct Segment {
 
 /// How long features last, and how many are used.
 struct PointChoice {
-  std::size_t shortest = 3;      ///< keyframes that see it
+  std::size_t shortest = 3;       ///< keyframes that see it
   std::size_t per_keyframe = 40;  ///< wanted; longest first
 };
 

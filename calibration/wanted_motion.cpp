@@ -6,11 +6,12 @@ namespace ear::calibration {
 namespace {
 
 struct Wish {
-  const char* entry;   ///< a part of its name; the first that fits counts
+  const char* entry;  ///< a part of its name; the first that fits counts
   const char* motion;
 };
 
-constexpr const char* kHop = "take off and hover 0.5 m over the floor for 20 s, moving to all sides so that the body tilts";
+constexpr const char* kHop =
+    "take off and hover 0.5 m over the floor for 20 s, moving to all sides so that the body tilts";
 constexpr const char* kTurn = "turn on the spot both ways for 10 s";
 constexpr const char* kSwing = "swing the body about the axle by 10 degrees while the wheels stand";
 constexpr const char* kEight = "drive figures of eight with bends of 1 m radius, and speed up and brake hard";
@@ -49,14 +50,17 @@ std::string motion_that_shows(const std::string& entry) {
 std::string recommended_drive() {
   return "On a flat hard floor, in a room with texture 1 to 6 m away, in good light; about two and a half minutes.\n"
          " 1. Stand for 3 s.                                              biases, tilt\n"
-         " 2. Swing the body about the axle by 10 degrees for 10 s.       axle's direction and height, beams, laser clock\n"
+         " 2. Swing the body about the axle by 10 degrees for 10 s.       axle's direction and height, beams, laser "
+         "clock\n"
          " 3. Turn on the spot, two turns to the left, two to the right.  wheel separation, axle's position, lens\n"
          " 4. Drive a figure of eight with bends of 1 m radius, twice.    cameras in the body, time offsets, wheels\n"
          " 5. Drive 4 m straight on, brake hard, and back the same way.   wheel radii, axle's direction\n"
-         " 6. Take off, hover at 0.5 to 1 m for 20 s and move 0.5 m to each side, land on the same place; do it twice.\n"
+         " 6. Take off, hover at 0.5 to 1 m for 20 s and move 0.5 m to each side, land on the same place; do it "
+         "twice.\n"
          "                                                                beams: origins and directions; scale\n"
          " 7. Stand for 3 s.\n"
-         "What cannot fly: for step 6 drive over a ramp or a step of a few centimetres, along it and at an angle. Without\n"
+         "What cannot fly: for step 6 drive over a ramp or a step of a few centimetres, along it and at an angle. "
+         "Without\n"
          "it the lateral parts of the beams stay as they were given, and say so.\n";
 }
 

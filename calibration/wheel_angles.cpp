@@ -6,7 +6,7 @@
 
 namespace ear::calibration {
 
-constexpr double kLongest = 0.1;               // [s] between two readings
+constexpr double kLongest = 0.1;              // [s] between two readings
 constexpr TimeNs kHalfInterval = 20'000'000;  // of a speed
 
 WheelAngles::WheelAngles(const EncoderCalibration& encoder, const std::vector<EncoderSample>& samples) {

@@ -98,8 +98,7 @@ void calibrate_drives(const CalibrateArguments& args) {
   settings.filter = config.filter;
   settings.threads = args.threads;
   settings.progress = [&](const std::string& line) { progress.show(line); };
-  const calibration::Result result =
-      calibration::calibrate(*given, calibration::priors_of(*given), drives, settings);
+  const calibration::Result result = calibration::calibrate(*given, calibration::priors_of(*given), drives, settings);
   progress.finish();
 
   fs::create_directories(args.out);
@@ -142,7 +141,8 @@ void calibrate(const CalibrateArguments& args) {
 }  // namespace
 
 void add_calibrate_command(CLI::App& app) {
-  auto* command = app.add_subcommand("calibrate", "Wheels, beams, cameras and clocks from drives (docs/calibration.md)");
+  auto* command =
+      app.add_subcommand("calibrate", "Wheels, beams, cameras and clocks from drives (docs/calibration.md)");
   auto args = std::make_shared<CalibrateArguments>();
   command->add_option("RECORDING", args->recordings, "Drives of one vehicle; the first one's calibration is the start");
   command->add_option("--out", args->out, "Folder for sensor.yaml files, calibration.txt and calibration.json")

@@ -200,7 +200,8 @@ std::size_t count_cameras(const fs::path& mav0) {
   return left ? (right ? 2 : 1) : 0;
 }
 
-/// Where the sensor.yaml of a recording's sensor is: in the last of the folders given that has one, or in the recording.
+/// Where the sensor.yaml of a recording's sensor is: in the last of the folders given that has one, or in the
+/// recording.
 class SensorFiles {
  public:
   SensorFiles(const fs::path& mav0, const std::vector<fs::path>& given) : mav0_(mav0) {
@@ -211,7 +212,8 @@ class SensorFiles {
       for (const char* name : {"cam0", "cam1", "imu0", "encoder0", "laser0"}) {
         any = any || fs::exists(folders_.back() / name / "sensor.yaml");
       }
-      if (!any) throw InputError(located(path, 0, "", "no cam0/sensor.yaml, imu0/sensor.yaml or the like in this folder"));
+      if (!any)
+        throw InputError(located(path, 0, "", "no cam0/sensor.yaml, imu0/sensor.yaml or the like in this folder"));
     }
   }
 
@@ -264,8 +266,7 @@ void express_in_imu_frame(const Eigen::Isometry3d& T_FB, Calibration& calibratio
 
 }  // namespace
 
-Calibration load_calibration(const fs::path& mav0, const std::vector<fs::path>& calibration_files,
-                             Warnings& warnings) {
+Calibration load_calibration(const fs::path& mav0, const std::vector<fs::path>& calibration_files, Warnings& warnings) {
   const SensorFiles sensor_files(mav0, calibration_files);
   const std::vector<fs::path> kalibr_files = files_among(calibration_files);
   Calibration calibration;

@@ -14,8 +14,9 @@ namespace ear {
 /// The calibration of the sensors that a recording has (folders with a data.csv), from their sensor.yaml files.
 ///
 /// Of `calibration_files`, Kalibr's (camchain-imucam.yaml and/or imu.yaml, in any order) replace the cameras and the
-/// IMU, and folders with sensor.yaml files (of `ear calibrate`, or another recording) those of the sensors they hold. If imu0's T_BS is not the identity, all other poses are turned into the IMU's
-/// frame, which is our body, and a warning says so. Throws InputError.
+/// IMU, and folders with sensor.yaml files (of `ear calibrate`, or another recording) those of the sensors they hold.
+/// If imu0's T_BS is not the identity, all other poses are turned into the IMU's frame, which is our body, and a
+/// warning says so. Throws InputError.
 [[nodiscard]] Calibration load_calibration(const std::filesystem::path& mav0,
                                            const std::vector<std::filesystem::path>& calibration_files,
                                            Warnings& warnings);

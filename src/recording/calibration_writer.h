@@ -16,8 +16,8 @@ struct BeamSigma {
 };
 
 /// Writes `folder`/cam0/sensor.yaml and so on, one for each sensor, with the standard deviations that the calibration
-/// states. `heading` is a comment at the top of each; `beams` may be empty. Throws InputError, naming the file, where it
-/// cannot be written.
+/// states. `heading` is a comment at the top of each; `beams` may be empty. Throws InputError, naming the file, where
+/// it cannot be written.
 void write_calibration(const Calibration& calibration, const std::filesystem::path& folder, const std::string& heading,
                        const std::vector<BeamSigma>& beams);
 

@@ -68,5 +68,6 @@ TEST_CASE("calibrate: no estimate is an error in words") {
   given.encoder = EncoderCalibration{};
   CHECK_THROWS_WITH(static_cast<void>(calibrate(given, priors_of(given), {drive}, Settings{})),
                     doctest::Contains("parked: only"));
-  CHECK_THROWS_WITH(static_cast<void>(calibrate(given, priors_of(given), {}, Settings{})), doctest::Contains("no drive"));
+  CHECK_THROWS_WITH(static_cast<void>(calibrate(given, priors_of(given), {}, Settings{})),
+                    doctest::Contains("no drive"));
 }

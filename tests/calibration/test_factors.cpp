@@ -85,8 +85,8 @@ TEST_CASE("calibration: derivatives of rolling, and of wheels that stand on a pl
     roll.bend = random_vector(rng, 1e-3);
     const Pose T_i = random_pose(rng, 0.5, 5.0), T_j = random_pose(rng, 0.5, 5.0);
     const Eigen::VectorXd wheels = small(rng, 3, 0.02), axle = small(rng, 5, 0.02);
-    smoother::test::check_factor(RollFactor(roll), {block(T_i), block(T_j), small(rng, 9, 0.1), wheels, axle,
-                                                    small(rng, 1, 0.002)});
+    smoother::test::check_factor(RollFactor(roll),
+                                 {block(T_i), block(T_j), small(rng, 9, 0.1), wheels, axle, small(rng, 1, 0.002)});
     const StandFactor stand(StandModel{some_odometer(), {0.3, -0.2}, 0.002});
     smoother::test::check_factor(stand, {block(T_i), small(rng, 3, 0.2), wheels, axle});
   }
@@ -107,8 +107,8 @@ TEST_CASE("calibration: derivatives of a beam, the ground's change, the origin a
     beam.rate_B = random_vector(rng, 0.5);
     beam.range = 0.4;
     beam.sigma = 0.004;
-    smoother::test::check_factor(
-        BeamFactor(beam), {block(T_WB), small(rng, 3, 0.1), small(rng, 5, 0.02), small(rng, 1, 0.002)});
+    smoother::test::check_factor(BeamFactor(beam),
+                                 {block(T_WB), small(rng, 3, 0.1), small(rng, 5, 0.02), small(rng, 1, 0.002)});
     smoother::test::check_factor(GroundFactor(GroundModel{{0.1, 0.2}, {0.4, -0.1}, 0.001, 0.01}),
                                  {small(rng, 3, 0.1), small(rng, 3, 0.1)});
     smoother::test::check_factor(OriginFactor(OriginModel{T_WB}), {block(T_WB)});

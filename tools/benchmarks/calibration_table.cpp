@@ -116,13 +116,14 @@ void print(const Arguments& args, const std::vector<OtherDrive>& figures) {
 }
 
 void print(const std::vector<Row>& rows) {
-  std::printf("| | unit | prior | posterior | mean error | RMS error | mean squared normalized error | largest | shown |\n");
+  std::printf(
+      "| | unit | prior | posterior | mean error | RMS error | mean squared normalized error | largest | shown |\n");
   std::printf("|---|---|---|---|---|---|---|---|---|\n");
   for (const Row& row : rows) {
     const double n = row.count;
-    std::printf("| %s | %s | %.3g | %.3g | %+.3g | %.3g | %.2f | %.1f | %d of %d |\n", row.name.c_str(), row.unit.c_str(),
-                row.prior, row.posterior / n, row.mean / n, std::sqrt(row.squares / n), row.normalized / n, row.worst, row.shown,
-                row.count);
+    std::printf("| %s | %s | %.3g | %.3g | %+.3g | %.3g | %.2f | %.1f | %d of %d |\n", row.name.c_str(),
+                row.unit.c_str(), row.prior, row.posterior / n, row.mean / n, std::sqrt(row.squares / n),
+                row.normalized / n, row.worst, row.shown, row.count);
   }
 }
 
@@ -159,8 +160,8 @@ void calibration_table(const Arguments& args) {
                    static_cast<unsigned long long>(seeds[i]), taken.count(), noise.pixel, noise.roll.slip, noise.beam);
       for (std::size_t k = 0; k < made.errors.size(); ++k) {
         const calibration::Finding& finding = made.result.findings[k];
-        std::fprintf(stderr, "  %-45s %10.5f +- %.5f %s, changed by %.5f (%.2f with %s)\n", finding.name.c_str(), made.errors[k],
-                     finding.posterior, finding.unit.c_str(), finding.change, finding.correlation,
+        std::fprintf(stderr, "  %-45s %10.5f +- %.5f %s, changed by %.5f (%.2f with %s)\n", finding.name.c_str(),
+                     made.errors[k], finding.posterior, finding.unit.c_str(), finding.change, finding.correlation,
                      finding.entangled_with.c_str());
       }
     }
@@ -179,7 +180,8 @@ int parse_and_run(int argc, char** argv) {
   app.add_option("--calibration-error", args.calibration_error, "as in ear simulate")->capture_default_str();
   app.add_option("--duration", args.duration, "[s] stop earlier");
   app.add_option("--threads", args.threads, "the figures do not depend on it")->capture_default_str();
-  app.add_flag("--perfect-sensors", args.perfect_sensors, "what the models leave out, alone: no noise but that of the tracks");
+  app.add_flag("--perfect-sensors", args.perfect_sensors,
+               "what the models leave out, alone: no noise but that of the tracks");
   app.add_option("--track-sigma", args.track_sigma, "[px]")->capture_default_str();
   app.add_option("--drives", args.drives, "sequences that the filter then drives, by each calibration")->delimiter(',');
   app.add_option("--interval", args.interval, "[s] between keyframes")->capture_default_str();

@@ -49,7 +49,8 @@ std::string yaml_line(const char* key, const std::optional<double>& value) {
 }  // namespace
 
 std::string to_text(const Result& result) {
-  std::string text = line("%-46s %11s %10s %9s %9s  %s\n", "", "given", "change", "known to", "before", "entangled with");
+  std::string text =
+      line("%-46s %11s %10s %9s %9s  %s\n", "", "given", "change", "known to", "before", "entangled with");
   for (const Finding& finding : result.findings) {
     const std::string change = finding.shown ? line("%+.4g", finding.change) : "kept";
     text += line("%-46s %11.6g %10s %9.3g %9.3g  %s %.2f [%s]\n", finding.name.c_str(), finding.given, change.c_str(),
@@ -85,14 +86,12 @@ std::string to_json(const Result& result) {
                           {"correlation", finding.correlation},
                           {"motion_wanted", finding.motion_wanted}});
   }
-  const Json json{{"parameters", parameters},
-                  {"noise",
-                   {{"feature_px", result.noise.pixel},
-                    {"slip", result.noise.roll.slip},
-                    {"beam", result.noise.beam}}},
-                  {"encoder_time_offset", result.encoder_time},
-                  {"laser_time_offset", result.laser_time},
-                  {"left_out_s", result.left_out}};
+  const Json json{
+      {"parameters", parameters},
+      {"noise", {{"feature_px", result.noise.pixel}, {"slip", result.noise.roll.slip}, {"beam", result.noise.beam}}},
+      {"encoder_time_offset", result.encoder_time},
+      {"laser_time_offset", result.laser_time},
+      {"left_out_s", result.left_out}};
   return json.dump(1) + "\n";
 }
 

@@ -8,7 +8,8 @@
 
 namespace ear::calibration {
 
-/// A table: value, change, prior, posterior, what it is entangled with; then what was not shown, and what would show it.
+/// A table: value, change, prior, posterior, what it is entangled with; then what was not shown, and what would show
+/// it.
 [[nodiscard]] std::string to_text(const Result& result);
 [[nodiscard]] std::string to_json(const Result& result);
 
