@@ -13,5 +13,6 @@ void add_bench_command(CLI::App& app);
 void add_export_command(CLI::App& app);
 void add_experiments_command(CLI::App& app);
 void add_live_command(CLI::App& app);
+void add_calibrate_command(CLI::App& app);  ///< where Ceres was found
 
 }  // namespace ear::tools

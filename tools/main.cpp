@@ -33,6 +33,9 @@ int run_subcommand(int argc, char** argv) {
   ear::tools::add_bench_command(app);
   ear::tools::add_export_command(app);
   ear::tools::add_experiments_command(app);
+#ifdef EAR_WITH_CALIBRATION
+  ear::tools::add_calibrate_command(app);
+#endif
   ear::tools::add_log_options(app);
   try {
     app.parse(argc, argv);

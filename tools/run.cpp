@@ -243,8 +243,8 @@ void add_run_command(CLI::App& app) {
       ->check(CLI::ExistingFile);
   command
       ->add_option("--calibration", args->calibration,
-                   "Kalibr's camchain-imucam.yaml and imu.yaml, instead of sensor.yaml")
-      ->check(CLI::ExistingFile);
+                   "Kalibr's camchain-imucam.yaml and imu.yaml, or a folder of ear calibrate, instead of sensor.yaml")
+      ->check(CLI::ExistingPath);
   command->add_option("--start", args->start, "Begin with the state in this file (docs/recordings.md)")
       ->check(CLI::ExistingFile);
   command->add_option("--camera-rate", args->camera_rate_hz, "Leave out frames to reach this rate [Hz]")

@@ -57,7 +57,7 @@ void simulate(const SimulateArguments& args) {
 
 std::string list_of_sequences() {
   std::string list = "Sequences:";
-  for (const std::string& name : simulator::sequence_names()) {
+  for (const std::string& name : simulator::all_sequence_names()) {
     list += "\n  " + name + ": " + simulator::find_sequence(name).summary;
   }
   return list;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 
 #include "src/recording/input_error.h"
 #include "src/recording/yaml_map.h"
@@ -199,12 +200,48 @@ std::size_t count_cameras(const fs::path& mav0) {
   return left ? (right ? 2 : 1) : 0;
 }
 
-void read_cameras(const fs::path& mav0, Calibration& calibration) {
+/// Where the sensor.yaml of a recording's sensor is: in the last of the folders given that has one, or in the
+/// recording.
+class SensorFiles {
+ public:
+  SensorFiles(const fs::path& mav0, const std::vector<fs::path>& given) : mav0_(mav0) {
+    for (const fs::path& path : given) {
+      if (!fs::is_directory(path)) continue;
+      folders_.push_back(fs::is_directory(path / "mav0") ? path / "mav0" : path);
+      bool any = false;
+      for (const char* name : {"cam0", "cam1", "imu0", "encoder0", "laser0"}) {
+        any = any || fs::exists(folders_.back() / name / "sensor.yaml");
+      }
+      if (!any)
+        throw InputError(located(path, 0, "", "no cam0/sensor.yaml, imu0/sensor.yaml or the like in this folder"));
+    }
+  }
+
+  [[nodiscard]] fs::path of(const std::string& sensor) const {
+    for (auto folder = folders_.rbegin(); folder != folders_.rend(); ++folder) {
+      if (fs::exists(*folder / sensor / "sensor.yaml")) return *folder / sensor / "sensor.yaml";
+    }
+    return mav0_ / sensor / "sensor.yaml";
+  }
+
+ private:
+  fs::path mav0_;
+  std::vector<fs::path> folders_;
+};
+
+std::vector<fs::path> files_among(const std::vector<fs::path>& paths) {
+  std::vector<fs::path> files;
+  std::copy_if(paths.begin(), paths.end(), std::back_inserter(files),
+               [](const fs::path& path) { return !fs::is_directory(path); });
+  return files;
+}
+
+void read_cameras(const fs::path& mav0, const SensorFiles& files, Calibration& calibration) {
   for (const char* name : {"cam0", "cam1"}) {
     const bool right = !calibration.cameras.empty();
-    if (has_sensor(mav0, name)) calibration.cameras.push_back(read_camera(mav0 / name / "sensor.yaml", right));
+    if (has_sensor(mav0, name)) calibration.cameras.push_back(read_camera(files.of(name), right));
   }
-  if (has_sensor(mav0, "cam0")) read_time_offset(YamlMap::load(mav0 / "cam0" / "sensor.yaml"), calibration);
+  if (has_sensor(mav0, "cam0")) read_time_offset(YamlMap::load(files.of("cam0")), calibration);
 }
 
 // Reads imu0/sensor.yaml and returns its T_BS: IMU to the body of the files.
@@ -229,15 +266,17 @@ void express_in_imu_frame(const Eigen::Isometry3d& T_FB, Calibration& calibratio
 
 }  // namespace
 
-Calibration load_calibration(const fs::path& mav0, const std::vector<fs::path>& kalibr_files, Warnings& warnings,
+Calibration load_calibration(const fs::path& mav0, const std::vector<fs::path>& calibration_files, Warnings& warnings,
                              CalibrationKind kind) {
+  const SensorFiles sensor_files(mav0, calibration_files);
+  const std::vector<fs::path> kalibr_files = files_among(calibration_files);
   Calibration calibration;
   const std::size_t cameras = count_cameras(mav0);
-  if (!has_camchain(kalibr_files)) read_cameras(mav0, calibration);
-  if (has_sensor(mav0, "encoder0")) calibration.encoder = read_encoder(mav0 / "encoder0" / "sensor.yaml");
-  if (has_sensor(mav0, "laser0")) calibration.lasers = read_lasers(mav0 / "laser0" / "sensor.yaml");
+  if (!has_camchain(kalibr_files)) read_cameras(mav0, sensor_files, calibration);
+  if (has_sensor(mav0, "encoder0")) calibration.encoder = read_encoder(sensor_files.of("encoder0"));
+  if (has_sensor(mav0, "laser0")) calibration.lasers = read_lasers(sensor_files.of("laser0"));
 
-  const fs::path imu_file = mav0 / "imu0" / "sensor.yaml";
+  const fs::path imu_file = sensor_files.of("imu0");
   if (kind == CalibrationKind::alone && !fs::exists(imu_file) && kalibr_files.empty()) {
     warnings.add("calibration: imu0",
                  located(imu_file, 0, "", "does not exist: noise of a typical small IMU is assumed"));

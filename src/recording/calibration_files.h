@@ -19,12 +19,13 @@ enum class CalibrationKind {
 
 /// The calibration of the sensors that a recording has (folders with a data.csv), from their sensor.yaml files.
 ///
-/// `kalibr_files` (camchain-imucam.yaml and/or imu.yaml, in any order) replace the cameras and the IMU; wheels and
-/// lasers always come from the recording. If imu0's T_BS is not the identity, all other poses are turned into the IMU's
-/// frame, which is our body, and a warning says so. Throws InputError.
+/// Of `calibration_files`, Kalibr's (camchain-imucam.yaml and/or imu.yaml, in any order) replace the cameras and the
+/// IMU, and folders with sensor.yaml files (of `ear calibrate`, or another recording) those of the sensors they hold.
+/// If imu0's T_BS is not the identity, all other poses are turned into the IMU's frame, which is our body, and a
+/// warning says so. Throws InputError.
 [[nodiscard]] Calibration load_calibration(const std::filesystem::path& mav0,
-                                           const std::vector<std::filesystem::path>& kalibr_files, Warnings& warnings,
-                                           CalibrationKind kind = CalibrationKind::recording);
+                                           const std::vector<std::filesystem::path>& calibration_files,
+                                           Warnings& warnings, CalibrationKind kind = CalibrationKind::recording);
 
 /// Kalibr's results: camchain-imucam.yaml (T_cam_imu or T_cn_cnm1, intrinsics, timeshift_cam_imu) and its imu.yaml,
 /// bare or below a key imu0. Throws InputError.

@@ -35,6 +35,7 @@ LAYERS = {
     "filter/start/": ["filter/start/", *SOURCES, *BELOW_SOURCES, "filter/advice.h"],
     "filter/health/": ["filter/health/", "filter/ingest/", *RECORDS, "filter/advice.h", "include/ear/", "eigen", "freestanding"],
     "smoother/": ["smoother/", *FILTER, "include/ear/", "eigen", "ceres", "freestanding"],
+    "calibration/": ["calibration/", "smoother/", *FILTER, "include/ear/", "eigen", "ceres", "freestanding"],
     "frontend/": ["frontend/", "include/ear/", "eigen", "opencv", *STANDARD],
     "src/": ["src/", "src/log/", *FILTER, "frontend/", "include/ear/", "eigen", "opencv", *STANDARD],
     "src/log/": ["src/log/", "include/ear/", "spdlog", "posix", *STANDARD],

@@ -1,5 +1,6 @@
 #include "tools/simulator/sequence.h"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
@@ -329,16 +330,90 @@ Sequence sway3() {
            slipping(sway(3.0, 8.0), -0.20, -0.30), sway(6.0, 12.0), stand(3.0)}};
 }
 
+// What shows every part of the calibration: `ear calibrate --plan`.
+Sequence calibrate() {
+  const auto aside = [](double left) { return in_air(drift(stand(1.4), left)); };
+  const auto ahead = [](double forward) {
+    Leg leg = in_air(stand(1.4));
+    leg.forward = forward;
+    return leg;
+  };
+  return {"calibrate",
+          "the drive that shows the calibration: swings, turns on the spot, figures of eight, hops with tilts",
+          Terrain(),
+          {4.0, 4.4},
+          0.0,
+          {stand(3.0),
+           sway(10.0, 10.0),
+           spin(400, 1.0),
+           stand(0.5),
+           spin(-400, 1.0),
+           stand(0.5),
+           turn(0.9, 360, 0.8),
+           turn(0.9, -360, 0.8),
+           turn(0.9, 360, 0.9),
+           turn(0.9, -360, 0.9),
+           stand(1.0),
+           drive(4.0, 1.0),
+           stand(0.6),
+           reverse(4.0, 1.0),
+           stand(1.0),
+           take_off(0.4, 1.2),
+           aside(1.0),
+           aside(-1.0),
+           aside(1.0),
+           aside(-1.0),
+           ahead(0.8),
+           ahead(-0.8),
+           stand(0.8),
+           land(0.4),
+           stand(1.5),
+           sway(6.0, 10.0),
+           take_off(1.5, 2.4),
+           aside(1.0),
+           aside(-1.0),
+           ahead(1.0),
+           ahead(-1.0),
+           in_air(spin(90, 0.9)),
+           aside(-1.0),
+           aside(1.0),
+           aside(-1.0),
+           aside(1.0),
+           in_air(spin(-90, 0.9)),
+           stand(0.8),
+           land(1.5),
+           stand(1.5),
+           take_off(0.4, 1.2),
+           aside(-1.0),
+           aside(1.0),
+           aside(-1.0),
+           aside(1.0),
+           stand(0.8),
+           land(0.4),
+           stand(1.0),
+           spin(90, 0.9),
+           drive(2.0, 1.0),
+           stand(0.6),
+           reverse(2.0, 0.8),
+           stand(3.0)}};
+}
+
 std::vector<Sequence> all_sequences() {
-  return {standing(), flat1(), flat2(), flat3(), wave1(), wave2(), wave3(),      slope(),
-          lawn(),     fly1(),  fly2(),  sway1(), sway2(), sway3(), occlusion1(), occlusion2()};
+  return {standing(), flat1(), flat2(), flat3(), wave1(), wave2(),      wave3(),      slope(),    lawn(),
+          fly1(),     fly2(),  sway1(), sway2(), sway3(), occlusion1(), occlusion2(), calibrate()};
 }
 
 }  // namespace
 
-std::vector<std::string> sequence_names() {
+std::vector<std::string> all_sequence_names() {
   std::vector<std::string> names;
   for (const Sequence& sequence : all_sequences()) names.push_back(sequence.name);
+  return names;
+}
+
+std::vector<std::string> sequence_names() {
+  std::vector<std::string> names = all_sequence_names();
+  names.erase(std::remove(names.begin(), names.end(), "calibrate"), names.end());
   return names;
 }
 

@@ -51,8 +51,10 @@ struct Sequence {
   Hindrance hindrance = {};
 };
 
-/// The names that `find_sequence` knows.
+/// The names that `find_sequence` knows, but for `calibrate`: the sequences that estimators are compared on.
 [[nodiscard]] std::vector<std::string> sequence_names();
+/// All of them.
+[[nodiscard]] std::vector<std::string> all_sequence_names();
 
 /// Throws std::invalid_argument, naming those that exist, if there is none of that name.
 [[nodiscard]] Sequence find_sequence(const std::string& name);

@@ -1,0 +1,164 @@
+#include "calibration/allan.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+namespace ear::calibration {
+namespace {
+
+constexpr double kShortest = 2.0;        // [s] of standing
+constexpr double kFewestClusters = 9.0;  // of the longest averaging time
+constexpr double kSure = 3.0;            // a walk is claimed where it is this many sigmas from none
+constexpr double kWindow = 0.5;          // [s] over which standing is looked for
+constexpr double kOverlap = 1.4;         // neighbouring averaging times see the same noise
+constexpr double kTurns = 0.02;          // [rad/s] of a window's mean from the first one's
+constexpr double kTilts = 0.2;           // [m/s^2]
+constexpr double kShakes = 2.0;          // times the spread of the quietest window
+constexpr double kFirstTau = 0.02;       // [s] below, filters and digits of the sensor show
+
+double squared(double x) { return x * x; }
+
+/// Overlapping Allan variance with clusters of m samples, from the running sum (one longer than the signal).
+double allan_variance(const std::vector<double>& sum, std::size_t m) {
+  double total = 0.0;
+  const std::size_t count = sum.size() - 2 * m;
+  for (std::size_t i = 0; i < count; ++i) total += squared(sum[i + 2 * m] - 2.0 * sum[i + m] + sum[i]);
+  return total / (2.0 * squared(static_cast<double>(m)) * static_cast<double>(count));
+}
+
+/// Of white noise, for overlapping clusters: what the variance of the estimate amounts to.
+double degrees_of_freedom(std::size_t samples, std::size_t m) {
+  const auto n = static_cast<double>(samples);
+  const auto k = static_cast<double>(m);
+  return (3.0 * (n - 1.0) / (2.0 * k) - 2.0 * (n - 2.0) / n) * 4.0 * k * k / (4.0 * k * k + 5.0);
+}
+
+/// variance(tau) = N^2 / tau + K^2 tau / 3, by weighted least squares; each octave counts as independent.
+void fit(AllanResult& result) {
+  Eigen::Matrix2d A = Eigen::Matrix2d::Zero();
+  Eigen::Vector2d x = Eigen::Vector2d::Zero();
+  for (int iteration = 0; iteration < 20; ++iteration) {
+    A.setZero();
+    Eigen::Vector2d b = Eigen::Vector2d::Zero();
+    for (const AllanPoint& point : result.points) {
+      if (point.tau < kFirstTau) continue;
+      const Eigen::Vector2d h(1.0 / point.tau, point.tau / 3.0);
+      const double variance = squared(point.deviation);
+      // The spread is that of the model's variance, not of the one that was measured.
+      const double model = iteration == 0 ? variance : std::max(h.dot(x), 1e-12 * variance);
+      const double weight = 1.0 / squared(2.0 * point.relative_sigma * model);
+      A += weight * h * h.transpose();
+      b += weight * variance * h;
+    }
+    if (!(A.determinant() > 0.0)) return;
+    x = A.inverse() * b;
+    if (x(1) < 0.0) x = Eigen::Vector2d(b(0) / A(0, 0), 0.0);
+  }
+  const Eigen::Matrix2d P = A.inverse();
+  if (x(0) > 0.0) result.white = Measured{std::sqrt(x(0)), std::sqrt(P(0, 0)) / (2.0 * std::sqrt(x(0)))};
+  const double spread = std::sqrt(P(1, 1));
+  if (x(1) > kSure * spread) {
+    result.random_walk = Measured{std::sqrt(x(1)), spread / (2.0 * std::sqrt(x(1)))};
+  } else {
+    result.walk_below = std::sqrt(x(1) + 2.0 * spread);
+  }
+}
+
+/// Means and spread of half a second.
+struct Window {
+  Eigen::Vector3d gyro = Eigen::Vector3d::Zero();
+  Eigen::Vector3d accel = Eigen::Vector3d::Zero();
+  double gyro_spread = 0.0;
+};
+
+Window window_of(const std::vector<ImuSample>& imu, std::size_t from, std::size_t size) {
+  Window window;
+  const auto n = static_cast<double>(size);
+  for (std::size_t k = from; k < from + size; ++k) {
+    window.gyro += imu[k].gyro_B / n;
+    window.accel += imu[k].accel_B / n;
+  }
+  double sum = 0.0;
+  for (std::size_t k = from; k < from + size; ++k) sum += (imu[k].gyro_B - window.gyro).squaredNorm() / n;
+  window.gyro_spread = std::sqrt(sum);
+  return window;
+}
+
+/// First and last index of the longest stretch that neither moves nor shakes: where rotors idle, a body is at rest, but
+/// the spread is not that of the sensor.
+std::pair<std::size_t, std::size_t> longest_rest(const std::vector<ImuSample>& imu, double interval) {
+  const auto size = std::max<std::size_t>(2, static_cast<std::size_t>(std::lround(kWindow / interval)));
+  std::vector<Window> windows;
+  for (std::size_t i = 0; i + size <= imu.size(); i += size) windows.push_back(window_of(imu, i, size));
+  if (windows.empty()) return {0, 0};
+  const auto quieter = [](const Window& a, const Window& b) { return a.gyro_spread < b.gyro_spread; };
+  const double quiet = std::min_element(windows.begin(), windows.end(), quieter)->gyro_spread;
+  std::size_t best = 0, best_size = 0, begin = 0;
+  for (std::size_t i = 0; i < windows.size(); ++i) {
+    const bool moves = (windows[i].gyro - windows[begin].gyro).norm() > kTurns ||
+                       (windows[i].accel - windows[begin].accel).norm() > kTilts;
+    if (moves) begin = i;
+    if (windows[i].gyro_spread > kShakes * quiet) {
+      begin = i + 1;
+      continue;
+    }
+    if (i + 1 - begin > best_size) {
+      best = begin;
+      best_size = i + 1 - begin;
+    }
+  }
+  return {best * size, (best + best_size) * size};
+}
+
+double median_interval(const std::vector<ImuSample>& imu) {
+  std::vector<double> intervals;
+  for (std::size_t i = 1; i < imu.size(); ++i) intervals.push_back(seconds_between(imu[i - 1].t_ns, imu[i].t_ns));
+  const auto middle = intervals.begin() + static_cast<std::ptrdiff_t>(intervals.size() / 2);
+  std::nth_element(intervals.begin(), middle, intervals.end());
+  return *middle;
+}
+
+}  // namespace
+
+AllanResult allan(const std::vector<double>& signal, double interval) {
+  AllanResult result;
+  double mean = 0.0;
+  for (const double value : signal) mean += value / static_cast<double>(signal.size());
+  std::vector<double> sum(1, 0.0);
+  for (const double value : signal) sum.push_back(sum.back() + value - mean);
+  for (std::size_t m = 1; kFewestClusters * static_cast<double>(m) <= static_cast<double>(signal.size()); m *= 2) {
+    const double freedom = std::max(1.0, degrees_of_freedom(signal.size(), m));
+    result.points.push_back(
+        {static_cast<double>(m) * interval, std::sqrt(allan_variance(sum, m)), kOverlap / std::sqrt(2.0 * freedom)});
+  }
+  fit(result);
+  return result;
+}
+
+ImuNoise noise_at_rest(const std::vector<ImuSample>& imu) {
+  if (imu.size() < 100) throw std::invalid_argument("hardly any inertial samples: " + std::to_string(imu.size()));
+  const double interval = median_interval(imu);
+  const auto [from, to] = longest_rest(imu, interval);
+  ImuNoise result;
+  result.duration = static_cast<double>(to - from) * interval;
+  result.rate_hz = 1.0 / interval;
+  if (result.duration < kShortest) {
+    throw std::invalid_argument("it stands for " + std::to_string(result.duration) +
+                                " s at most; 2 s are needed for "
+                                "the white noise, an hour and more for the random walk");
+  }
+  std::vector<double> signal(to - from);
+  for (int axis = 0; axis < 6; ++axis) {
+    for (std::size_t i = from; i < to; ++i) {
+      signal[i - from] = axis < 3 ? imu[i].gyro_B(axis) : imu[i].accel_B(axis - 3);
+    }
+    result.axes.push_back(allan(signal, interval));
+  }
+  return result;
+}
+
+}  // namespace ear::calibration

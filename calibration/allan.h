@@ -1,0 +1,46 @@
+// The noise of an inertial sensor from a recording of it at rest: Allan deviation (IEEE Std 952), white noise and
+// random walk, each with its uncertainty.
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <vector>
+
+#include "ear/types.h"
+
+namespace ear::calibration {
+
+/// Overlapping Allan deviation at one averaging time.
+struct AllanPoint {
+  double tau = 0.0;             ///< [s]
+  double deviation = 0.0;       ///< [unit of the signal]
+  double relative_sigma = 0.0;  ///< of the deviation: 1 / sqrt(2 degrees of freedom)
+};
+
+/// A value that was found, and its standard deviation.
+struct Measured {
+  double value = 0.0;
+  double sigma = 0.0;
+};
+
+struct AllanResult {
+  std::vector<AllanPoint> points;
+  std::optional<Measured> white;        ///< density [unit/sqrt(Hz)]
+  std::optional<Measured> random_walk;  ///< density [unit/s/sqrt(Hz)]; nothing where the length cannot tell
+  double walk_below = 0.0;              ///< where it cannot: what it is below, with 97.5 % probability
+};
+
+/// Of one axis, evenly sampled at `interval` seconds.
+[[nodiscard]] AllanResult allan(const std::vector<double>& signal, double interval);
+
+/// Of all six axes: gyroscope x, y, z [rad/s], accelerometer x, y, z [m/s^2]. Only the longest stretch at rest is used.
+struct ImuNoise {
+  double duration = 0.0;  ///< [s] of that stretch
+  double rate_hz = 0.0;
+  std::vector<AllanResult> axes;
+};
+
+/// Throws std::invalid_argument where it does not stand for 2 s at least.
+[[nodiscard]] ImuNoise noise_at_rest(const std::vector<ImuSample>& imu);
+
+}  // namespace ear::calibration

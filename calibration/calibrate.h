@@ -1,0 +1,61 @@
+// From drives to a calibration, and to words about what they did not show.
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "calibration/batch.h"
+
+namespace ear::calibration {
+
+/// What became of one number.
+struct Finding {
+  std::string name;  ///< "encoder0: wheel radius, mean"
+  std::string unit;  ///< of all that follows
+  double given = 0.0;
+  double change = 0.0;         ///< calibrated less given; 0 where the given value stays
+  double prior = 0.0;          ///< standard deviation before
+  double posterior = 0.0;      ///< standard deviation after
+  bool shown = true;           ///< false: the drives did not show it, and the given value stays
+  std::string entangled_with;  ///< the entry of the largest correlation
+  double correlation = 0.0;    ///< of it
+  std::string motion_wanted;   ///< what would show it; empty where it was shown
+};
+
+/// Residuals over the noise, per sensor.
+struct SensorFit {
+  std::string sensor;
+  std::size_t count = 0;
+  double sigma = 0.0;  ///< the noise found, in `unit`
+  std::string unit;
+  double outliers = 0.0;  ///< share beyond 4 sigma
+};
+
+struct Result {
+  Calibration calibration;  ///< with the standard deviations stated
+  Parameters parameters;
+  std::vector<Finding> findings;  ///< in the order of blocks_of()
+  Eigen::MatrixXd covariance;     ///< in the units of Parameters
+  Noise noise;
+  std::vector<SensorFit> fits;
+  double encoder_time = 0.0, laser_time = 0.0;  ///< [s] to add to the stamps
+  double left_out = 0.0;                        ///< [s] of the drives, where there was no estimate in one piece
+};
+
+struct Settings {
+  FilterConfig filter;    ///< of the first guess
+  double interval = 0.2;  ///< [s] between keyframes
+  Noise noise;
+  int threads = 2;
+  /// What the drives must have brought a standard deviation down to, of its prior, for a value to be changed.
+  double shown_below = 0.7;
+  std::function<void(const std::string&)> progress;  ///< may be empty
+};
+
+/// Throws std::invalid_argument where the drives cannot be used, std::runtime_error where no minimum is found.
+[[nodiscard]] Result calibrate(const Calibration& given, const Priors& priors, const std::vector<Drive>& drives,
+                               const Settings& settings);
+
+}  // namespace ear::calibration

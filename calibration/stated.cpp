@@ -1,0 +1,74 @@
+#include "calibration/stated.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <string>
+
+namespace ear::calibration {
+namespace {
+
+constexpr double kDegree = 3.14159265358979323846 / 180.0;
+
+double degrees(const std::vector<Finding>& findings, const std::string& name) {
+  return kDegree * mean_sigma(findings, name).value_or(0.0);
+}
+
+double thousandth(const std::vector<Finding>& findings, const std::string& name) {
+  return 1e-3 * mean_sigma(findings, name).value_or(0.0);
+}
+
+/// What the filter knows of the beams is what each reads too much: along it, and by the direction at a short range.
+double range_sigma(const std::vector<Finding>& findings, const LaserCalibration& lasers) {
+  constexpr double kLeast = 5e-4;  // [m]
+  double sum = 0.0;
+  for (const LaserBeam& beam : lasers.beams) {
+    const double origin = thousandth(findings, "laser0 " + beam.name + ": origin z");
+    sum += origin * origin / static_cast<double>(lasers.beams.size());
+  }
+  return std::max(kLeast, std::sqrt(sum));
+}
+
+}  // namespace
+
+std::optional<double> mean_sigma(const std::vector<Finding>& findings, const std::string& name) {
+  double sum = 0.0;
+  int count = 0;
+  for (const Finding& finding : findings) {
+    if (finding.name.rfind(name, 0) != 0) continue;
+    sum += finding.posterior * finding.posterior;
+    ++count;
+  }
+  if (count == 0) return std::nullopt;
+  return std::sqrt(sum / count);
+}
+
+Calibration with_sigmas(Calibration calibration, const std::vector<Finding>& findings) {
+  const auto lens = [&](const std::string& camera, double focal) {  // the filter counts it as a rotation
+    return mean_sigma(findings, camera + ": principal point").value_or(0.0) / focal;
+  };
+  if (!calibration.cameras.empty()) {
+    calibration.cameras[0].pose_sigma =
+        PoseSigma{std::hypot(degrees(findings, "cam0: rotation"), lens("cam0", calibration.cameras[0].fu)),
+                  thousandth(findings, "cam0: position")};
+    calibration.camera_time_offset_sigma = thousandth(findings, "cam0: time");
+  }
+  if (calibration.cameras.size() > 1) {
+    calibration.cameras[1].pose_sigma =
+        PoseSigma{std::hypot(degrees(findings, "cam1: rotation"), lens("cam1", calibration.cameras[1].fu)),
+                  thousandth(findings, "cam1: position")};
+  }
+  if (calibration.encoder) {
+    EncoderCalibration& encoder = *calibration.encoder;
+    encoder.T_BO_sigma =
+        PoseSigma{degrees(findings, "encoder0: axle turned"), thousandth(findings, "encoder0: position")};
+    encoder.wheel_radius_sigma = thousandth(findings, "encoder0: wheel radius, mean");
+    encoder.wheel_radius_difference_sigma =
+        std::min(thousandth(findings, "encoder0: wheel radius, left"), 1.9 * *encoder.wheel_radius_sigma);
+    encoder.track_width_sigma = thousandth(findings, "encoder0: wheel separation");
+  }
+  if (calibration.lasers) calibration.lasers->offset_sigma = range_sigma(findings, *calibration.lasers);
+  return calibration;
+}
+
+}  // namespace ear::calibration

@@ -1,0 +1,144 @@
+#include "calibration/models.h"
+#include "calibration/pixel_factor.h"
+#include "smoother/feature_factor.h"
+#include "tests/smoother/support.h"
+#include "tests/support/random_drive.h"
+
+using namespace ear;
+using namespace ear::calibration;
+using ear::smoother::test::block;
+using ear::test::random_pose;
+using ear::test::random_vector;
+
+namespace {
+
+Eigen::VectorXd small(std::mt19937_64& rng, int size, double sigma) {
+  std::normal_distribution<double> normal(0.0, sigma);
+  Eigen::VectorXd values(size);
+  for (double& value : values) value = normal(rng);
+  return values;
+}
+
+GivenCameras some_cameras(std::mt19937_64& rng, LensModel lens) {
+  GivenCameras given;
+  given.poses = ear::test::random_cameras(rng);
+  for (CameraCalibration& camera : given.lens) {
+    camera.fu = 385.0;
+    camera.fv = 384.0;
+    camera.cu = 320.0;
+    camera.cv = 240.0;
+    camera.lens = lens;
+    camera.distortion = {-0.05, 0.04, 6e-4, -4e-4};
+  }
+  return given;
+}
+
+InverseDepthPoint point_ahead(const Pose& T_WB, const GivenCameras& given, std::mt19937_64& rng) {
+  InverseDepthPoint anchor;
+  anchor.R_WA = T_WB.R * given.poses.T_BC0.R * exp_so3(random_vector(rng, 0.1));
+  anchor.p_WA = T_WB.p + T_WB.R * given.poses.T_BC0.p + random_vector(rng, 0.2);
+  anchor.bearing_A = {0.1, -0.2, 1.0};
+  anchor.inverse_depth = 0.25;
+  return anchor;
+}
+
+OdometerState some_odometer() {
+  OdometerState odometer;
+  odometer.wheel_radius << 0.075, 0.076;
+  odometer.track_width = 0.4;
+  odometer.T_BO.R = exp_so3({0.02, -0.03, 0.05});
+  odometer.T_BO.p = {-0.02, 0.01, -0.05};
+  return odometer;
+}
+
+}  // namespace
+
+TEST_CASE("calibration: derivatives of an observation in pixels, both cameras and lenses") {
+  std::mt19937_64 rng{3};
+  for (const LensModel lens : {LensModel::radial_tangential, LensModel::equidistant}) {
+    for (int trial = 0; trial < 5; ++trial) {
+      const GivenCameras given = some_cameras(rng, lens);
+      const Pose T_WB = random_pose(rng, 0.5, 5.0);
+      const InverseDepthPoint anchor = point_ahead(T_WB, given, rng);
+      const smoother::PointBlock point = smoother::to_block(anchor);
+      const PixelObservation seen{{300.0, 250.0}, 0.5, 0.004, random_vector(rng, 0.5), random_vector(rng, 1.0)};
+      const Eigen::VectorXd camera = small(rng, 6, 0.02), stereo = small(rng, 6, 0.01), bent = small(rng, 5, 0.01);
+      const Eigen::VectorXd time = small(rng, 1, 0.005);
+      const Eigen::VectorXd p = Eigen::Map<const Eigen::VectorXd>(point.data(), 3);
+      smoother::test::check_factor(LeftPixel(seen, given, anchor), {block(T_WB), camera, bent, time, p});
+      smoother::test::check_factor(RightPixel(seen, given, anchor), {block(T_WB), camera, stereo, bent, time, p});
+    }
+  }
+}
+
+TEST_CASE("calibration: derivatives of rolling, and of wheels that stand on a plane") {
+  std::mt19937_64 rng{5};
+  for (int trial = 0; trial < 10; ++trial) {
+    RollModel roll;
+    roll.given = some_odometer();
+    roll.angle = small(rng, 2, 2.0);
+    roll.speed_gained = small(rng, 2, 3.0);
+    roll.turned = random_vector(rng, 0.2);
+    roll.duration = 0.2;
+    roll.along = {random_vector(rng, 1.0).normalized(), random_vector(rng, 1.0).normalized()};
+    roll.R_im = exp_so3(random_vector(rng, 0.1));
+    roll.bend = random_vector(rng, 1e-3);
+    const Pose T_i = random_pose(rng, 0.5, 5.0), T_j = random_pose(rng, 0.5, 5.0);
+    const Eigen::VectorXd wheels = small(rng, 3, 0.02), axle = small(rng, 5, 0.02);
+    smoother::test::check_factor(RollFactor(roll),
+                                 {block(T_i), block(T_j), small(rng, 9, 0.1), wheels, axle, small(rng, 1, 0.002)});
+    const StandFactor stand(StandModel{some_odometer(), {0.3, -0.2}, 0.002});
+    smoother::test::check_factor(stand, {block(T_i), small(rng, 3, 0.2), wheels, axle});
+  }
+}
+
+TEST_CASE("calibration: derivatives of a beam, the ground's change, the origin and a reference") {
+  std::mt19937_64 rng{7};
+  for (int trial = 0; trial < 10; ++trial) {
+    const Pose T_WB{exp_so3(random_vector(rng, 0.1)), random_vector(rng, 1.0)};
+    BeamModel beam;
+    beam.p_BL = random_vector(rng, 0.1);
+    beam.d_B = Eigen::Vector3d(0.02, -0.01, -1.0).normalized();
+    beam.tilt = tangent_basis(-beam.d_B);
+    beam.centre = {0.1, 0.2};
+    beam.R_kt = exp_so3(random_vector(rng, 0.05));
+    beam.p_kt = random_vector(rng, 0.1);
+    beam.v_kt = random_vector(rng, 0.5);
+    beam.rate_B = random_vector(rng, 0.5);
+    beam.range = 0.4;
+    beam.sigma = 0.004;
+    smoother::test::check_factor(BeamFactor(beam),
+                                 {block(T_WB), small(rng, 3, 0.1), small(rng, 5, 0.02), small(rng, 1, 0.002)});
+    smoother::test::check_factor(GroundFactor(GroundModel{{0.1, 0.2}, {0.4, -0.1}, 0.001, 0.01}),
+                                 {small(rng, 3, 0.1), small(rng, 3, 0.1)});
+    smoother::test::check_factor(OriginFactor(OriginModel{T_WB}), {block(T_WB)});
+    smoother::test::check_factor(BiasFactor(BiasModel{}), {small(rng, 9, 0.1)});
+    smoother::test::check_factor(ReferenceFactor(ReferenceModel{random_vector(rng, 1.0), random_vector(rng, 0.1), 0.5}),
+                                 {block(T_WB), small(rng, 4, 0.3)});
+  }
+}
+
+TEST_CASE("calibration: a beam meets a tilted plane where a line meets it, by other algebra") {
+  std::mt19937_64 rng{9};
+  for (int trial = 0; trial < 10; ++trial) {
+    const Pose T_WB{exp_so3(random_vector(rng, 0.2)), random_vector(rng, 1.0) + Eigen::Vector3d(0.0, 0.0, 8.0)};
+    const Eigen::VectorXd ground = small(rng, 3, 0.1);
+    BeamModel beam;
+    beam.p_BL = random_vector(rng, 0.1);
+    beam.d_B = Eigen::Vector3d(0.1, -0.05, -1.0).normalized();
+    beam.tilt = tangent_basis(-beam.d_B);
+    beam.centre = {0.3, -0.4};
+    const Eigen::Vector3d from = T_WB.p + T_WB.R * beam.p_BL, along = T_WB.R * beam.d_B;
+    double low = 0.0, high = 60.0;  // bisection: above the plane, and below it
+    for (int i = 0; i < 80; ++i) {
+      const double middle = 0.5 * (low + high);
+      const Eigen::Vector3d hit = from + middle * along;
+      const double plane = ground(0) + ground(1) * (hit.x() - 0.3) + ground(2) * (hit.y() + 0.4);
+      (hit.z() > plane ? low : high) = middle;
+    }
+    beam.range = low;
+    const Eigen::VectorXd r = smoother::test::residual(
+        BeamFactor(beam), {block(T_WB), ground, Eigen::VectorXd::Zero(5), Eigen::VectorXd::Zero(1)});
+    CHECK(std::abs(r(0)) < 1e-9);
+  }
+}

@@ -1,0 +1,22 @@
+// A recording as a drive for the batch estimate: read once, with the front end.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <string>
+
+#include "calibration/drive.h"
+#include "ear/config.h"
+#include "src/recording/recording.h"
+
+namespace ear::calibration {
+
+/// `progress` is told how far it is, 0 to 1. Throws InputError for a recording that cannot be read.
+[[nodiscard]] Drive recorded_drive(Recording& recording, const std::string& name, const Config& config,
+                                   const std::function<void(double)>& progress);
+
+/// Positions of a file that `ear evaluate` reads as a truth (TUM, EuRoC's csv). Those outside of the drive are left
+/// out. Throws std::runtime_error, naming the file, where none is left.
+void add_reference(const std::filesystem::path& file, double sigma, Drive& drive);
+
+}  // namespace ear::calibration

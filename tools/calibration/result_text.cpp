@@ -1,0 +1,135 @@
+#include "tools/calibration/result_text.h"
+
+#include <array>
+#include <cmath>
+#include <cstdarg>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+namespace ear::calibration {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+[[gnu::format(printf, 1, 2)]] std::string line(const char* format, ...) {
+  std::array<char, 400> text{};
+  std::va_list arguments;
+  va_start(arguments, format);
+  std::vsnprintf(text.data(), text.size(), format, arguments);
+  va_end(arguments);
+  return text.data();
+}
+
+std::string clock_line(const char* sensor, double offset) {
+  return line("%s: add %.2f ms to its stamps; ear run takes them as they are\n", sensor, 1e3 * offset);
+}
+
+const char* axis_name(std::size_t axis) {
+  constexpr std::array kNames{"gyroscope x",     "gyroscope y",     "gyroscope z",
+                              "accelerometer x", "accelerometer y", "accelerometer z"};
+  return kNames[axis];
+}
+
+/// Root mean square of three axes; nothing where one of them has none.
+std::optional<double> of_sensor(const ImuNoise& noise, std::size_t first, bool walk) {
+  double sum = 0.0;
+  for (std::size_t axis = first; axis < first + 3; ++axis) {
+    const std::optional<Measured>& found = walk ? noise.axes[axis].random_walk : noise.axes[axis].white;
+    if (!found) return std::nullopt;
+    sum += found->value * found->value / 3.0;
+  }
+  return std::sqrt(sum);
+}
+
+std::string yaml_line(const char* key, const std::optional<double>& value) {
+  if (value) return line("%s: %.3g\n", key, *value);
+  return line("# %s: cannot be told from this length\n", key);
+}
+
+}  // namespace
+
+std::string to_text(const Result& result) {
+  std::string text =
+      line("%-46s %11s %10s %9s %9s  %s\n", "", "given", "change", "known to", "before", "entangled with");
+  for (const Finding& finding : result.findings) {
+    const std::string change = finding.shown ? line("%+.4g", finding.change) : "kept";
+    text += line("%-46s %11.6g %10s %9.3g %9.3g  %s %.2f [%s]\n", finding.name.c_str(), finding.given, change.c_str(),
+                 finding.posterior, finding.prior, finding.entangled_with.c_str(), finding.correlation,
+                 finding.unit.c_str());
+  }
+  bool any = false;
+  for (const Finding& finding : result.findings) {
+    if (finding.shown) continue;
+    if (!any) text += "\nNot shown by this motion; the values given stay:\n";
+    any = true;
+    text += "  " + finding.name + ": " + finding.motion_wanted + "\n";
+  }
+  if (std::abs(result.encoder_time) > 1e-3) text += clock_line("encoder0", result.encoder_time);
+  if (std::abs(result.laser_time) > 1e-3) text += clock_line("laser0", result.laser_time);
+  text += line("noise found: features %.2f px, slip %.2g m/sqrt(m), beams %.2g m\n", result.noise.pixel,
+               result.noise.roll.slip, result.noise.beam);
+  if (result.left_out > 0.0) text += line("%.1f s of the drives were left out: no estimate there\n", result.left_out);
+  return text;
+}
+
+std::string to_json(const Result& result) {
+  Json parameters = Json::array();
+  for (const Finding& finding : result.findings) {
+    parameters.push_back({{"name", finding.name},
+                          {"unit", finding.unit},
+                          {"given", finding.given},
+                          {"change", finding.change},
+                          {"prior_sigma", finding.prior},
+                          {"posterior_sigma", finding.posterior},
+                          {"shown", finding.shown},
+                          {"entangled_with", finding.entangled_with},
+                          {"correlation", finding.correlation},
+                          {"motion_wanted", finding.motion_wanted}});
+  }
+  const Json json{
+      {"parameters", parameters},
+      {"noise", {{"feature_px", result.noise.pixel}, {"slip", result.noise.roll.slip}, {"beam", result.noise.beam}}},
+      {"encoder_time_offset", result.encoder_time},
+      {"laser_time_offset", result.laser_time},
+      {"left_out_s", result.left_out}};
+  return json.dump(1) + "\n";
+}
+
+std::string to_text(const ImuNoise& noise) {
+  std::string text = line("%.1f s at rest, %.1f Hz\n", noise.duration, noise.rate_hz);
+  for (std::size_t axis = 0; axis < noise.axes.size(); ++axis) {
+    const AllanResult& found = noise.axes[axis];
+    text += line("%-16s", axis_name(axis));
+    text += found.white ? line(" white %.3g +- %.1g", found.white->value, found.white->sigma) : " white: none found";
+    if (found.random_walk) {
+      text += line(", random walk %.3g +- %.1g\n", found.random_walk->value, found.random_walk->sigma);
+    } else {
+      text += ", random walk: the recording is too short to tell\n";
+    }
+  }
+  text += yaml_line("gyroscope_noise_density", of_sensor(noise, 0, false));
+  text += yaml_line("gyroscope_random_walk", of_sensor(noise, 0, true));
+  text += yaml_line("accelerometer_noise_density", of_sensor(noise, 3, false));
+  text += yaml_line("accelerometer_random_walk", of_sensor(noise, 3, true));
+  return text;
+}
+
+std::string to_json(const ImuNoise& noise) {
+  const auto measured = [](const std::optional<Measured>& value) {
+    return value ? Json{{"value", value->value}, {"sigma", value->sigma}} : Json(nullptr);
+  };
+  Json axes = Json::array();
+  for (std::size_t axis = 0; axis < noise.axes.size(); ++axis) {
+    const AllanResult& found = noise.axes[axis];
+    Json points = Json::array();
+    for (const AllanPoint& point : found.points) points.push_back({point.tau, point.deviation, point.relative_sigma});
+    axes.push_back({{"axis", axis_name(axis)},
+                    {"white", measured(found.white)},
+                    {"random_walk", measured(found.random_walk)},
+                    {"tau_deviation_relative_sigma", points}});
+  }
+  const Json json{{"duration_s", noise.duration}, {"rate_hz", noise.rate_hz}, {"axes", axes}};
+  return json.dump(1) + "\n";
+}
+
+}  // namespace ear::calibration

@@ -1,0 +1,78 @@
+#include "tools/calibration/simulated_drive.h"
+
+#include "calibration/lens.h"
+#include "frontend/lens.h"
+
+namespace ear::calibration {
+namespace {
+constexpr double kDegree = 3.14159265358979323846 / 180.0;
+
+/// Simulated tracks come without a lens. Here they pass the true one, and the one that was given is taken out.
+void see_through(const Calibration& truth, const Calibration& given, FeatureFrame& frame) {
+  const auto seen = [&](std::size_t camera, const Eigen::Vector2d& ray) {
+    const Eigen::Vector2d pixel = to_pixel<double>(truth.cameras[camera], {}, ray);
+    return Lens(given.cameras[camera]).to_normalized(pixel).value_or(ray);
+  };
+  for (FeatureObservation& feature : frame.features) {
+    feature.left = seen(0, feature.left);
+    if (feature.has_right) feature.right = seen(1, feature.right);
+  }
+}
+
+}  // namespace
+
+Priors drawn_priors(double factor) {
+  Priors priors{};
+  priors.camera_rotation = factor * 0.2 * kDegree;
+  priors.camera_position = factor * 1e-3;
+  priors.stereo_rotation = factor * 0.02 * kDegree;
+  priors.stereo_position = factor * 5e-5;
+  priors.focal_length = factor * 1e-3;
+  priors.principal_point = factor * 0.5;
+  priors.distortion = 1e-3;
+  priors.camera_time = factor * 2e-3;
+  priors.wheel_radius = factor * 4e-3;
+  priors.radius_difference = factor * 1e-3;
+  priors.track_width = factor * 5e-3;
+  priors.axle_rotation = factor * 0.3 * kDegree;
+  priors.axle_position = factor * 3e-3;
+  priors.encoder_time = 2e-3;
+  priors.beam_direction = factor * 0.3 * kDegree;
+  priors.beam_origin = factor * 2e-3;
+  priors.laser_time = 2e-3;
+  return priors;
+}
+
+Drive recorded_drive(const simulator::Simulation& simulation, const Calibration& given) {
+  Drive drive;
+  drive.name = simulation.options().sequence;
+  drive.imu = simulation.imu();
+  drive.encoders = simulation.encoders();
+  drive.lasers = simulation.lasers();
+  for (std::size_t i = 0; i < simulation.frames().size(); ++i) {
+    drive.frames.push_back(simulation.tracks(i));
+    see_through(simulation.true_calibration(), given, drive.frames.back());
+  }
+  return drive;
+}
+
+SimulatedCalibration calibrate_simulated(const simulator::Simulation& simulation, const Settings& settings) {
+  const double factor = simulation.options().calibration_error.value_or(1.0);
+  const Priors priors = drawn_priors(factor);
+  Calibration given = simulation.calibration();
+  given.imu.accel_bias_sigma = 0.08 * std::max(1.0, factor);
+  const std::vector<Drive> drives{recorded_drive(simulation, given)};
+  SimulatedCalibration made;
+  made.result = calibrate(given, priors, drives, settings);
+  Parameters truth = errors_of(given, simulation.true_calibration());
+  const std::vector<ParameterBlock> blocks = blocks_of(truth, given, priors);
+  std::size_t i = 0;
+  for (const ParameterBlock& block : blocks) {
+    for (const Entry& entry : block.entries) {
+      made.errors.push_back(entry.scale * *entry.value - made.result.findings[i++].change);
+    }
+  }
+  return made;
+}
+
+}  // namespace ear::calibration
