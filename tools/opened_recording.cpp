@@ -1,8 +1,7 @@
 #include "tools/opened_recording.h"
 
-#include <stdlib.h>
-
 #include <cstdio>
+#include <cstdlib>
 #include <string>
 #include <system_error>
 #include <utility>

@@ -8,8 +8,9 @@
 
 namespace ear {
 
-/// Writes <sensor>/sensor.yaml below `folder` for every sensor of the calibration: what load_calibration() reads is the
-/// same to the last bit. Throws InputError if a file cannot be written.
+/// Writes <sensor>/sensor.yaml below `folder` for every sensor of the calibration, for load_calibration(). Numbers come
+/// back as they are, but for rotations and directions, which it makes orthonormal once more (1e-15). Throws InputError
+/// if a file cannot be written.
 void write_sensor_files(const Calibration& calibration, const std::filesystem::path& folder);
 
 /// Reads a recording to its end and writes all of it, with its calibration, to `folder`/mav0. Images become .pgm files,

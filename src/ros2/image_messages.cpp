@@ -133,9 +133,9 @@ void StereoPairing::match(std::vector<RecordedFrame>& frames, Warnings& warnings
       warnings.add("cam0: image without a right one", std::to_string(t_ns) + " ns");
       emit(frames, {});
     } else {
-      GreyImage partner = std::move(right.front());
+      const GreyImage partner = std::move(right.front());
       right.pop_front();
-      emit(frames, std::move(partner));
+      emit(frames, partner);
     }
   }
   while (right.size() > kMostWaiting) {
@@ -144,7 +144,7 @@ void StereoPairing::match(std::vector<RecordedFrame>& frames, Warnings& warnings
   }
 }
 
-void StereoPairing::emit(std::vector<RecordedFrame>& frames, GreyImage right) {
+void StereoPairing::emit(std::vector<RecordedFrame>& frames, const GreyImage& right) {
   GreyImage left = std::move(waiting_[0].front());
   waiting_[0].pop_front();
   frames.push_back(make_frame(left.t_ns, std::max(left.arrival_ns, right.arrival_ns), {left.pixels, right.pixels}));

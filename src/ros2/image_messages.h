@@ -39,7 +39,7 @@ class StereoPairing {
 
  private:
   void match(std::vector<RecordedFrame>& frames, Warnings& warnings);
-  void emit(std::vector<RecordedFrame>& frames, GreyImage right);
+  void emit(std::vector<RecordedFrame>& frames, const GreyImage& right);
 
   bool stereo_;
   std::array<std::deque<GreyImage>, 2> waiting_;

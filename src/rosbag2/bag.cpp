@@ -1,8 +1,7 @@
 #include "src/rosbag2/bag.h"
 
-#include <stdlib.h>
-
 #include <algorithm>
+#include <cstdlib>
 #include <system_error>
 #include <utility>
 
@@ -49,7 +48,10 @@ Metadata read_metadata(const fs::path& folder) {
   if (storage != "mcap" && storage != "sqlite3") {
     throw map.error("storage_identifier", "'" + storage + "' is not known: mcap, sqlite3");
   }
-  for (const std::string& name : map.texts("relative_file_paths")) metadata.files.push_back(folder / name);
+  for (const std::string& name : map.texts("relative_file_paths")) {
+    const bool inside = fs::exists(folder / name);  // the first versions of rosbag2 put the folder's name before it
+    metadata.files.push_back(folder / (inside ? fs::path(name) : fs::path(name).filename()));
+  }
   const auto format = map.get_or("compression_format", std::string());
   const auto mode = map.get_or("compression_mode", std::string());
   if (!format.empty() && format != "zstd") throw map.error("compression_format", "'" + format + "' is not known: zstd");

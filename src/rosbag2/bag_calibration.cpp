@@ -1,9 +1,9 @@
 #include "src/rosbag2/bag_calibration.h"
 
-#include <stdlib.h>
-
 #include <algorithm>
+#include <cstdlib>
 #include <fstream>
+#include <optional>
 #include <system_error>
 
 #include "src/recording/calibration_files.h"
@@ -15,6 +15,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr std::size_t kRateMessages = 200;
 constexpr std::size_t kMostTransforms = 1000;  // messages of tf_static
 
 const std::string kAttachments = "calibration/";
@@ -76,6 +77,26 @@ ros2::CalibrationMessages read_messages(const Bag& bag, const ros2::SensorTopics
   return messages;
 }
 
+/// The rate of a topic's first messages by their stamps [Hz]; nothing if they are too few.
+std::optional<double> rate_of(const Bag& bag, const std::string& topic, Warnings& warnings) {
+  BagPass pass = bag.pass({topic});
+  std::vector<TimeNs> stamps;
+  for (std::size_t i = 0; i < kRateMessages; ++i) {
+    const auto message = pass.next(warnings);
+    if (!message) break;
+    try {
+      stamps.push_back(ros2::stamp_of(*message, ros2::decode<ros2::Imu>(*message).header));
+    } catch (const InputError&) {  // the reading itself reports it
+    }
+  }
+  std::vector<TimeNs> intervals;
+  for (std::size_t i = 1; i < stamps.size(); ++i) intervals.push_back(duration_ns(stamps[i - 1], stamps[i]));
+  if (intervals.empty()) return std::nullopt;
+  const auto median = intervals.begin() + static_cast<std::ptrdiff_t>(intervals.size() / 2);
+  std::nth_element(intervals.begin(), median, intervals.end());
+  return *median > 0 ? std::optional<double>(1e9 / static_cast<double>(*median)) : std::nullopt;
+}
+
 std::size_t camera_count(const ros2::SensorTopics& topics) {
   if (topics.left.empty()) return 0;
   return topics.right.empty() ? 1 : 2;
@@ -95,6 +116,10 @@ Calibration bag_calibration(const Bag& bag, const ros2::SensorTopics& topics, co
   const CalibrationFolder folder(bag, topics);
   Calibration calibration =
       load_calibration(folder.path(), options.calibration_files, warnings, CalibrationKind::alone);
+  if (!folder.has("imu0") && options.calibration_files.empty()) {
+    const std::string& topic = topics.imu_apart() ? topics.gyro : topics.imu;
+    calibration.imu.rate_hz = rate_of(bag, topic, warnings).value_or(calibration.imu.rate_hz);
+  }
   const std::size_t cameras = camera_count(topics);
   calibration.cameras.resize(std::min(calibration.cameras.size(), cameras));
   if (topics.wheels.empty()) calibration.encoder.reset();

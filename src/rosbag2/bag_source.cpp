@@ -85,12 +85,8 @@ class FrameStream {
         pass_(bag.pass(topics_of(topics, cameras.size()))),
         pairing_(cameras.size() == 2),
         sizes_(cameras, options.accept_bad_calibration),
-        rate_(options.camera_rate_hz) {
-    const BagTopic* const left = bag.find(topics.left);
-    const auto log_time =
-        left == nullptr ? std::map<std::string, std::string>::const_iterator{} : left->metadata.find("log_time");
-    ordered_by_log_ = left != nullptr && log_time != left->metadata.end() && log_time->second == "arrival";
-  }
+        rate_(options.camera_rate_hz),
+        logged_on_arrival_(logged_on_arrival(bag.find(topics.left))) {}
 
   DecodedFrame next() {
     DecodedFrame decoded;
@@ -109,6 +105,12 @@ class FrameStream {
  private:
   static std::vector<std::string> topics_of(const ros2::SensorTopics& topics, std::size_t cameras) {
     return cameras == 2 ? std::vector<std::string>{topics.left, topics.right} : std::vector<std::string>{topics.left};
+  }
+
+  static bool logged_on_arrival(const BagTopic* topic) {
+    if (topic == nullptr) return false;
+    const auto log_time = topic->metadata.find("log_time");
+    return log_time != topic->metadata.end() && log_time->second == "arrival";
   }
 
   bool fits(const ImageView& image, std::size_t camera, Warnings& warnings) {
@@ -135,7 +137,7 @@ class FrameStream {
   void take(const OwnedMessage& message, std::vector<RecordedFrame>& frames, Warnings& warnings) {
     const std::size_t camera = message.topic == topics_.left ? 0 : 1;
     ros2::GreyImage image = ros2::grey_image(message, "cam" + std::to_string(camera), warnings);
-    if (ordered_by_log_) image.arrival_ns = message.received_ns;
+    if (logged_on_arrival_) image.arrival_ns = message.received_ns;
     any_ = true;
     pairing_.take(camera, std::move(image), frames, warnings);
   }
@@ -146,8 +148,8 @@ class FrameStream {
   ros2::StereoPairing pairing_;
   ImageSizes sizes_;
   FrameRate rate_;
+  bool logged_on_arrival_;  // frames are ordered by the log's time, as RecordingWriter writes it
   std::deque<RecordedFrame> ready_;
-  bool ordered_by_log_ = false;
   bool any_ = false;
   bool ended_ = false;
 };

@@ -15,7 +15,7 @@ namespace {
 
 using Memory = std::shared_ptr<const std::vector<std::uint8_t>>;
 
-constexpr std::size_t kCacheBytes = std::size_t{24} << 20U;
+constexpr std::size_t kCacheBytes = std::size_t{8} << 20U;
 
 /// Unpacks chunks and keeps the last ones: cursors of several topics pass over them at about the same time.
 class Chunks {

@@ -15,6 +15,18 @@ namespace ear::rosbag2 {
 
 namespace fs = std::filesystem;
 
+namespace {
+
+/// Transforms that never change are published once and kept for those who come later: what rosbag2 needs to know to do
+/// the same when it plays them. History and depth are left to it; durability 1 is transient local, reliability 1
+/// reliable.
+const std::string kEver = "\n    sec: 9223372036\n    nsec: 854775807\n";
+const std::string kLatched = "- history: 3\n  depth: 0\n  reliability: 1\n  durability: 1\n  deadline:" + kEver +
+                             "  lifespan:" + kEver + "  liveliness: 1\n  liveliness_lease_duration:" + kEver +
+                             "  avoid_ros_namespace_conventions: false";
+
+}  // namespace
+
 class RecordingWriter::Impl {
  public:
   Impl(const fs::path& file, const ros2::SensorTopics& topics, const Calibration& calibration, const fs::path& folder)
@@ -72,7 +84,9 @@ class RecordingWriter::Impl {
   void describe(TimeNs t_ns) {
     described_ = true;
     const ros2::TfMessage frames = ros2::static_frames(calibration_, topics_.base_frame, t_ns);
-    if (!frames.transforms.empty()) put(topics_.tf_static, t_ns, t_ns, frames);
+    if (!frames.transforms.empty()) {
+      put(topics_.tf_static, t_ns, t_ns, frames, {{"offered_qos_profiles", kLatched}});
+    }
     for (std::size_t i = 0; i < calibration_.cameras.size(); ++i) {
       put(i == 0 ? topics_.left_info : topics_.right_info, t_ns, t_ns,
           ros2::camera_info(calibration_.cameras[i], i, t_ns));

@@ -8,7 +8,7 @@ namespace {
 namespace fs = std::filesystem;
 
 InputError absent(const fs::path& file) {
-  return InputError(located(file, 0, "", "this program was built without ROS 2 bags: see docs/bags.md"));
+  return InputError(located(file, 0, "", "this program was built without ROS 2 bags: see docs/ros2.md"));
 }
 
 }  // namespace

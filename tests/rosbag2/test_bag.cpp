@@ -127,6 +127,7 @@ TEST_CASE("bag: without a calibration cameras and lasers come from messages, whe
   CHECK(write_mcap(recording, folder / "bag.mcap", folder / "nothing", {}, [](std::size_t) {}) > 200);
   const Recording of_bag = opened(folder / "bag.mcap");
   CHECK_FALSE(of_bag.calibration().encoder);
+  CHECK(of_bag.calibration().imu.rate_hz == 100.0);  // as its stamps are, in place of 200
   REQUIRE(of_bag.calibration().cameras.size() == 2);
   CHECK((of_bag.calibration().cameras[1].T_BC.matrix() - recording.calibration().cameras[1].T_BC.matrix()).norm() <
         1e-12);

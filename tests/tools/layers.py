@@ -40,6 +40,9 @@ LAYERS = {
     "src/log/": ["src/log/", "include/ear/", "spdlog", "posix", *STANDARD],
     "src/recording/": ["src/recording/", "src/log/", "include/ear/", "eigen", "opencv", "yaml-cpp", "json", *STANDARD],
     "src/bag/": ["src/bag/", "src/recording/", "include/ear/", "eigen", "ros", "yaml-cpp", *STANDARD],
+    # Bags and live publishers hand over the same bytes: only src/ros2/ knows what they mean.
+    "src/ros2/": ["src/ros2/", "src/recording/", "include/ear/", "eigen", "opencv", "fastcdr", *STANDARD],
+    "src/rosbag2/": ["src/rosbag2/", "src/ros2/", "src/recording/", "src/log/", "include/ear/", "eigen", "posix", *STANDARD],
     "src/mavlink/": ["src/mavlink/", *FILTER, "include/ear/", "eigen", "posix", *STANDARD],
     # Bags and live publishers hand over the same bytes: only src/ros2/ knows what they mean.
     "src/ros2/": ["src/ros2/", "src/recording/", "include/ear/", "eigen", "opencv", "fastcdr", *STANDARD],
@@ -68,7 +71,8 @@ HOSTED = ["atomic", "chrono", "condition_variable", "cstdio", "ctime", "filesyst
 
 LIBRARIES = {"Eigen": "eigen", "unsupported": "eigen", "opencv2": "opencv", "yaml-cpp": "yaml-cpp", "spdlog": "spdlog",
              "nlohmann": "json", "CLI": "cli11", "doctest": "doctest", "sys": "posix", "ceres": "ceres", "glog": "ceres",
-             "fastcdr": "fastcdr", "dds": "cyclone", "fastdds": "fastdds", "linux": "posix", "rosbag": "ros", "sensor_msgs": "ros", "geometry_msgs": "ros"}
+             "fastcdr": "fastcdr", "dds": "cyclone", "fastdds": "fastdds", "linux": "posix", "rosbag": "ros",
+             "sensor_msgs": "ros", "geometry_msgs": "ros"}
 
 INCLUDE = re.compile(r'^\s*#\s*include\s*["<]([^">]+)[">]')
 
