@@ -68,7 +68,7 @@ calibration::Drive read_drive(const fs::path& path, const CalibrateArguments& ar
   const OpenedRecording opened(path, args.config);
   RecordingOptions options;
   options.calibration_files = args.calibration;
-  Recording recording(opened.folder(), options);
+  Recording recording = opened.read(options);
   if (const auto missing = check_sensors(recording.calibration())) {
     throw InputError(located(path, 0, missing->where, missing->message));
   }
@@ -114,7 +114,7 @@ void calibrate_imu(const CalibrateArguments& args) {
   const OpenedRecording opened(args.imu, args.config);
   RecordingOptions options;
   options.accept_bad_calibration = true;
-  Recording recording(opened.folder(), options);
+  Recording recording = opened.read(options);
   std::vector<ImuSample> imu;
   while (const std::optional<Sample> sample = recording.next()) {
     if (const auto* inertial = std::get_if<ImuSample>(&*sample)) imu.push_back(*inertial);

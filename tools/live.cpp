@@ -142,6 +142,7 @@ class Record {
 #ifdef EAR_WITH_ROSBAG2
     recorder_ = std::make_unique<live::Recorder>(file, calibration, files.folder());
 #else
+    static_cast<void>(files);
     throw InputError(
         "--record: MCAP files are not built in: install libfastcdr-dev, libzstd-dev, liblz4-dev, "
         "libsqlite3-dev and zlib1g-dev, and build again");

@@ -13,7 +13,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kMostBytes = std::size_t{32} << 20U;  // that wait for the disk
+constexpr std::size_t kMostBytes = std::size_t{16} << 20U;  // that wait for the disk
 
 /// Without gaps between rows.
 ImageView copy(const ImageView& from, cv::Mat& to) {
