@@ -1,6 +1,7 @@
 #include <doctest/doctest.h>
 
 #include "src/recording/calibration_files.h"
+#include "src/recording/calibration_writer.h"
 #include "tests/recording/support.h"
 
 using namespace ear;
@@ -359,4 +360,66 @@ TEST_CASE("kalibr: standard deviations beside its values") {
   CHECK(c.cameras[1].pose_sigma->position == 0.00004);
   CHECK(c.camera_time_offset_sigma == 0.0004);
   CHECK(c.imu.gyro_bias_sigma == 0.02);
+}
+
+TEST_CASE("calibration: what is written comes back, in the place of the recording's own") {
+  const TempFolder folder;
+  write_full_recording(folder / "recording");
+  Calibration c = load(folder / "recording");
+  c.cameras[0].T_BC.translation().z() += 0.01;
+  c.cameras[0].fu = 11.0;
+  c.cameras[0].distortion[4] = 0.05;
+  c.cameras[0].lens = LensModel::radial_tangential;
+  c.cameras[1].pose_sigma = PoseSigma{1e-4, 2e-4};
+  c.camera_time_offset = -0.003;
+  c.camera_time_offset_sigma = 1e-4;
+  c.imu.gyro_noise = 0.002;
+  c.imu.accel_bias_sigma = 0.3;
+  c.encoder->wheel_radius = {0.0751, 0.0749};
+  c.encoder->wheel_radius_sigma = 1e-5;
+  c.encoder->wheel_radius_difference_sigma = 2e-5;
+  c.encoder->track_width_sigma = 3e-4;
+  c.encoder->T_BO_sigma = PoseSigma{1e-3, 2e-3};
+  c.encoder->stamp_sigma = 0.001;
+  c.lasers->beams[0].p_BL.x() += 0.002;
+  c.lasers->offset_sigma = 4e-3;
+  write_calibration(c, folder / "result", "by a test", {{0.001, 0.002}});
+
+  const Calibration back = load(folder / "recording", {folder / "result"});
+  REQUIRE(back.cameras.size() == c.cameras.size());
+  for (std::size_t i = 0; i < c.cameras.size(); ++i) {
+    const CameraCalibration &a = c.cameras[i], &b = back.cameras[i];
+    CHECK(b.T_BC.isApprox(a.T_BC, 1e-10));
+    CHECK(std::array{b.fu, b.fv, b.cu, b.cv} == std::array{a.fu, a.fv, a.cu, a.cv});
+    CHECK(b.distortion == a.distortion);
+    CHECK(b.lens == a.lens);
+    CHECK(b.rate_hz == a.rate_hz);
+  }
+  CHECK(back.cameras[1].pose_sigma->rotation == 1e-4);
+  CHECK(back.cameras[1].pose_sigma->position == 2e-4);
+  CHECK(back.camera_time_offset == -0.003);
+  CHECK(back.camera_time_offset_sigma == 1e-4);
+  CHECK(back.imu.gyro_noise == 0.002);
+  CHECK(back.imu.accel_random_walk == c.imu.accel_random_walk);
+  CHECK(back.imu.accel_bias_sigma == 0.3);
+  CHECK(back.encoder->T_BO.isApprox(c.encoder->T_BO, 1e-10));
+  CHECK(back.encoder->T_BO_sigma->position == 2e-3);
+  CHECK(back.encoder->wheel_radius == c.encoder->wheel_radius);
+  CHECK(back.encoder->wheel_radius_sigma == 1e-5);
+  CHECK(back.encoder->wheel_radius_difference_sigma == 2e-5);
+  CHECK(back.encoder->track_width_sigma == 3e-4);
+  CHECK(back.encoder->resolution == c.encoder->resolution);
+  CHECK(back.encoder->wraps == c.encoder->wraps);
+  CHECK(back.encoder->noise_counts == c.encoder->noise_counts);
+  CHECK(back.encoder->stamp_sigma == 0.001);
+  REQUIRE(back.lasers->beams.size() == c.lasers->beams.size());
+  CHECK(back.lasers->beams[0].name == c.lasers->beams[0].name);
+  CHECK(back.lasers->beams[0].p_BL.isApprox(c.lasers->beams[0].p_BL, 1e-10));
+  CHECK(back.lasers->beams[0].d_B.isApprox(c.lasers->beams[0].d_B, 1e-10));
+  CHECK(back.lasers->range_max == c.lasers->range_max);
+  CHECK(back.lasers->offset_sigma == 4e-3);
+
+  fs::create_directories(folder / "empty");
+  const std::string error = input_error_of([&] { load(folder / "recording", {folder / "empty"}); });
+  CHECK(error.find("no cam0/sensor.yaml, imu0/sensor.yaml or the like in this folder") != std::string::npos);
 }
