@@ -259,8 +259,8 @@ class BagSource : public SampleSource {
                const OwnedMessage* message, std::vector<LaserSample>& samples, Warnings& /*warnings*/) mutable {
       if (message != nullptr) {
         messages.take(*message, samples);
-      } else if (auto rest = messages.rest()) {
-        samples.push_back(std::move(*rest));
+      } else {
+        messages.finish(samples);
       }
     };
   }
