@@ -11,7 +11,7 @@ namespace ear::ros2 {
 namespace {
 
 constexpr TimeNs kSameTime = 10'000'000;
-constexpr TimeNs kSilent = 200'000'000;
+constexpr TimeNs kSilent = 500'000'000;
 constexpr std::size_t kMostPending = 64;
 
 }  // namespace

@@ -24,7 +24,7 @@ class LaserMessages {
   LaserMessages(const SensorTopics& topics, const LaserCalibration& lasers);
 
   /// Appends readings, in time order, to which nothing more will come: each beam is there, has already sent a later
-  /// message, or is silent for 0.2 s. Beams without a message are NaN, as are ranges outside of the calibration's.
+  /// message, or is silent for 0.5 s. Beams without a message are NaN, as are ranges outside of the calibration's.
   /// Throws InputError for another type or wrong bytes.
   void take(const RawMessage& message, std::vector<LaserSample>& samples);
   /// Appends what is not complete, at the end of a recording.
