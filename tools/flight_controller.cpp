@@ -44,33 +44,24 @@ void add_options(CLI::App& command, FlightControllerArguments& args) {
 
 FlightController::FlightController(const FlightControllerArguments& args, const Calibration& calibration,
                                    TimeNs first_ns)
-    : clock_(first_ns),
-      stream_(mounting(args, calibration), calibration.imu),
-      link_(args.address, {static_cast<std::uint8_t>(args.system)}, [this] { return clock_.now(); }) {
-  announce(mavlink::LinkHealth::starting, {});
-}
+    : R_BV_(mounting(args, calibration)),
+      clock_(first_ns),
+      link_(args.address, {static_cast<std::uint8_t>(args.system)}, [this] { return clock_.now(); }),
+      output_(link_, R_BV_, calibration.imu) {}
 
 void FlightController::before_sample(const Sample& sample, const Odometry& odometry) {
   clock_.wait_until(time_of(sample));
   const auto* const imu = std::get_if<ImuSample>(&sample);
   if (imu == nullptr) return;
-  if (last_imu_ns_ && stream_.wants_prediction(*last_imu_ns_)) {
-    if (const auto state = odometry.predict(*last_imu_ns_)) link_.send(stream_.add_prediction(*state));
+  if (last_imu_ns_ && output_.wants_prediction(*last_imu_ns_)) {
+    if (const auto state = odometry.predict(*last_imu_ns_)) output_.send_prediction(*state);
   }
-  stream_.add_imu(*imu);
+  output_.add_imu(*imu);
   last_imu_ns_ = imu->t_ns;
 }
 
 void FlightController::after_frame(const ReplayedFrame& frame, const Odometry& odometry) {
-  const auto message = stream_.add_frame(frame.estimate, odometry.status());
-  announce(stream_.health(), odometry.health().faulty);
-  if (message) link_.send(*message);
-  const std::uint64_t dropped = link_.counts().dropped;
-  if (dropped == dropped_) return;
-  dropped_ = dropped;
-  if (const auto held_back = log_limit_.allows("dropped", frame.t_ns)) {
-    log_warning("mavlink: " + std::to_string(dropped) + " messages not taken so far" + held_back_text(*held_back));
-  }
+  output_.take({frame.t_ns, frame.estimate, odometry.status(), odometry.health()});
 }
 
 std::string FlightController::report() const {
@@ -83,15 +74,6 @@ std::string FlightController::report() const {
       static_cast<unsigned long long>(counts.odometry), static_cast<unsigned long long>(counts.time_answers),
       static_cast<unsigned long long>(counts.dropped), 1e3 * clock_.latest());
   return line.data();
-}
-
-void FlightController::announce(mavlink::LinkHealth health, const SourceSet& faulty) {
-  const mavlink::StatusText text = mavlink::to_text(health, faulty);
-  if (text.text == announced_) return;
-  announced_ = text.text;
-  log_info("mavlink: says " + std::string(text.text));
-  link_.set_state(mavlink::to_system_state(health));
-  link_.send(text);
 }
 
 }  // namespace ear::tools

@@ -5,9 +5,8 @@
 #include <vector>
 
 #include "ear/odometry.h"
-#include "src/log/repeat_limit.h"
+#include "src/live/mavlink_output.h"
 #include "src/mavlink/link.h"
-#include "src/mavlink/odometry_stream.h"
 #include "src/recording/recording.h"
 #include "tools/real_time.h"
 #include "tools/replay.h"
@@ -43,15 +42,11 @@ class FlightController {
   [[nodiscard]] std::string report() const;
 
  private:
-  void announce(mavlink::LinkHealth health, const SourceSet& faulty);
-
+  Eigen::Matrix3d R_BV_;  ///< first: where it is not known, no line is opened
   RealTimeClock clock_;
-  mavlink::OdometryStream stream_;
+  mavlink::Link link_;  ///< its thread reads the clock
+  live::MavlinkOutput output_;
   std::optional<TimeNs> last_imu_ns_;
-  std::string announced_;      ///< the last text
-  std::uint64_t dropped_ = 0;  ///< messages not taken that the log knows of
-  RepeatLimit log_limit_{10.0};
-  mavlink::Link link_;  ///< last: its thread reads the clock
 };
 
 }  // namespace ear::tools

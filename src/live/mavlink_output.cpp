@@ -10,8 +10,8 @@ MavlinkOutput::MavlinkOutput(mavlink::Link& link, const Eigen::Matrix3d& R_BV, c
 }
 
 void MavlinkOutput::take(const LiveSample& sample) {
-  stream_.add_imu(sample.imu);
-  if (sample.state && stream_.wants_prediction(sample.state->t_ns)) link_.send(stream_.add_prediction(*sample.state));
+  add_imu(sample.imu);
+  if (sample.state && wants_prediction(sample.state->t_ns)) send_prediction(*sample.state);
 }
 
 void MavlinkOutput::take(const LiveFrame& frame) {

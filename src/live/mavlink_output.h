@@ -1,4 +1,5 @@
-// What a live process tells a flight controller: as `ear run --mavlink` (docs/mavlink.md).
+// What a flight controller is told, by a live process and by `ear run --mavlink` (docs/mavlink.md): estimates,
+// predicted states between them, and a line of text when the health of the estimate changes.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,7 +13,7 @@
 
 namespace ear::live {
 
-/// By the estimator's thread alone. Sending waits for nobody.
+/// By one thread alone, the estimator's. Sending waits for nobody.
 class MavlinkOutput {
  public:
   /// R_BV: see mavlink::mounting_of(). `link` must outlive it.
@@ -20,6 +21,11 @@ class MavlinkOutput {
 
   void take(const LiveSample& sample);
   void take(const LiveFrame& frame);
+
+  /// take(LiveSample) in its two steps, for who must not predict a state unless it is due.
+  void add_imu(const ImuSample& sample) { stream_.add_imu(sample); }
+  [[nodiscard]] bool wants_prediction(TimeNs t_ns) const { return stream_.wants_prediction(t_ns); }
+  void send_prediction(const NavState& state) { link_.send(stream_.add_prediction(state)); }
 
  private:
   void announce(mavlink::LinkHealth health, const SourceSet& faulty);
