@@ -4,6 +4,7 @@
 #include <mutex>
 #include <thread>
 
+#include "src/live/ros_calibration.h"
 #include "src/live/ros_publisher.h"
 #include "src/live/ros_sensors.h"
 #include "src/log/log.h"

@@ -1,4 +1,5 @@
 // Topics over the loopback interface, from one participant to another of this process.
+#include "src/live/ros_calibration.h"
 #include "src/live/ros_sensors.h"
 
 #include <doctest/doctest.h>
@@ -7,6 +8,7 @@
 #include <cstdlib>
 #include <thread>
 
+#include "src/live/ros_calibration.h"
 #include "src/ros2/cdr.h"
 #include "src/ros2/outgoing.h"
 
