@@ -7,6 +7,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "filter/ingest/median.h"
+
 namespace ear::calibration {
 namespace {
 
@@ -117,9 +119,7 @@ std::pair<std::size_t, std::size_t> longest_rest(const std::vector<ImuSample>& i
 double median_interval(const std::vector<ImuSample>& imu) {
   std::vector<double> intervals;
   for (std::size_t i = 1; i < imu.size(); ++i) intervals.push_back(seconds_between(imu[i - 1].t_ns, imu[i].t_ns));
-  const auto middle = intervals.begin() + static_cast<std::ptrdiff_t>(intervals.size() / 2);
-  std::nth_element(intervals.begin(), middle, intervals.end());
-  return *middle;
+  return upper_median(intervals);
 }
 
 }  // namespace

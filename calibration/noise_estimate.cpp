@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "filter/ingest/median.h"
+
 namespace ear::calibration {
 namespace {
 
@@ -11,12 +13,6 @@ constexpr std::size_t kFewest = 30;  // intervals
 constexpr double kLeast = 1e-4;      // [m/sqrt(m)]
 constexpr double kMedianToSigma = 1.4826;
 constexpr double kTwoPi = 6.283185307179586;
-
-double median(std::vector<double>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 /// Integrals of the rate over a path: about the ground's normal, and about the axle [rad].
 struct Turned {
@@ -39,7 +35,7 @@ Turned turned_along(const std::vector<PathNode>& path, const Eigen::Vector3d& n_
 double robust_sigma(std::vector<double> values) {
   if (values.empty()) return 0.0;
   for (double& value : values) value = std::abs(value);
-  return kMedianToSigma * median(values);
+  return kMedianToSigma * upper_median(values);
 }
 
 std::optional<double> slip_of(const Segment& segment, const RollSetting& setting) {
@@ -67,7 +63,7 @@ std::optional<double> slip_of(const Segment& segment, const RollSetting& setting
   }
   if (errors.size() < kFewest) return std::nullopt;
   const double sigma = robust_sigma(errors);
-  return std::sqrt(std::max(kLeast * kLeast, sigma * sigma - median(known)));
+  return std::sqrt(std::max(kLeast * kLeast, sigma * sigma - upper_median(known)));
 }
 
 }  // namespace ear::calibration

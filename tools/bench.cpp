@@ -23,6 +23,7 @@
 #include "tools/bench_figures.h"
 #include "tools/commands.h"
 #include "tools/floor.h"
+#include "tools/input_options.h"
 #include "tools/opened_recording.h"
 #include "tools/processor_time.h"
 #include "tools/replay.h"
@@ -206,8 +207,7 @@ void add_bench_command(CLI::App& app) {
   auto args = std::make_shared<BenchArguments>();
   command->add_option("RECORDING", args->recording, "Folder in the EuRoC/ASL layout, or a bag (docs/bags.md)")
       ->required();
-  command->add_option("--config", args->config, "Settings; what it leaves out keeps its default")
-      ->check(CLI::ExistingFile);
+  add_config_option(*command, args->config);
   command->add_flag("--json", args->json, "The figures as JSON, for --compare");
   command->add_option("--compare", args->compare, "What --json wrote before: shows the changes since")
       ->check(CLI::ExistingFile);

@@ -21,6 +21,7 @@
 #include "tools/calibration/recorded_drive.h"
 #include "tools/calibration/result_text.h"
 #include "tools/commands.h"
+#include "tools/input_options.h"
 #include "tools/opened_recording.h"
 #include "tools/progress.h"
 
@@ -147,12 +148,8 @@ void add_calibrate_command(CLI::App& app) {
   command->add_option("RECORDING", args->recordings, "Drives of one vehicle; the first one's calibration is the start");
   command->add_option("--out", args->out, "Folder for sensor.yaml files, calibration.txt and calibration.json")
       ->capture_default_str();
-  command->add_option("--config", args->config, "Settings; what it leaves out keeps its default")
-      ->check(CLI::ExistingFile);
-  command
-      ->add_option("--calibration", args->calibration,
-                   "Kalibr's camchain-imucam.yaml and imu.yaml, or a folder of ear calibrate, instead of sensor.yaml")
-      ->check(CLI::ExistingPath);
+  add_config_option(*command, args->config);
+  add_calibration_option(*command, args->calibration);
   command->add_option("--reference", args->reference, "Positions that something else measured, one file per RECORDING")
       ->check(CLI::ExistingPath);
   command->add_option("--reference-sigma", args->reference_sigma, "Of one such position, one axis [m]")

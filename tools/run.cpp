@@ -23,6 +23,7 @@
 #include "tools/commands.h"
 #include "tools/estimators.h"
 #include "tools/flight_controller.h"
+#include "tools/input_options.h"
 #include "tools/opened_recording.h"
 #include "tools/progress.h"
 #include "tools/replay.h"
@@ -239,12 +240,8 @@ void add_run_command(CLI::App& app) {
       ->required();
   command->add_option("--out", args->out, "Folder for estimate.tum, states.csv, summary.json, config.yaml")
       ->capture_default_str();
-  command->add_option("--config", args->config, "Settings; what it leaves out keeps its default")
-      ->check(CLI::ExistingFile);
-  command
-      ->add_option("--calibration", args->calibration,
-                   "Kalibr's camchain-imucam.yaml and imu.yaml, or a folder of ear calibrate, instead of sensor.yaml")
-      ->check(CLI::ExistingPath);
+  add_config_option(*command, args->config);
+  add_calibration_option(*command, args->calibration);
   command->add_option("--start", args->start, "Begin with the state in this file (docs/recordings.md)")
       ->check(CLI::ExistingFile);
   command->add_option("--camera-rate", args->camera_rate_hz, "Leave out frames to reach this rate [Hz]")
