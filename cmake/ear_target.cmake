@@ -7,4 +7,8 @@ function(ear_target target)
   target_include_directories(${target} PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include>
                                               $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>
                                        PRIVATE ${PROJECT_SOURCE_DIR})
+  get_target_property(type ${target} TYPE)
+  if(TARGET ear_precompiled AND type STREQUAL "STATIC_LIBRARY")
+    target_precompile_headers(${target} REUSE_FROM ear_precompiled)
+  endif()
 endfunction()

@@ -30,7 +30,8 @@ else()
                                                        $<INSTALL_INTERFACE:${source_include_dir}>)
     endif()
   endforeach()
-  install(DIRECTORY ${PROJECT_SOURCE_DIR}/src DESTINATION ${source_include_dir} FILES_MATCHING PATTERN "*.h")
+  install(DIRECTORY ${PROJECT_SOURCE_DIR}/src DESTINATION ${source_include_dir} FILES_MATCHING PATTERN "*.h"
+          PATTERN "view" EXCLUDE)  # a part of the ear program alone
 endif()
 foreach(part IN LISTS EAR_PACKAGE_PARTS)
   set(target ear)

@@ -3,13 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <opencv2/features2d.hpp>
 
 namespace ear {
 namespace {
 
 constexpr int kMargin = 10;                       // [px] from the image's edge: the patch and a bit
-constexpr int kFastReach = 3;                     // [px] radius of FAST's circle: cells are searched with this overlap
 constexpr std::array<int, 2> kThresholds{20, 7};  // grey steps of FAST, tried in this order
 constexpr std::size_t kCandidates = 5;            // of one cell, ranked by FAST's score, that are looked at closely
 constexpr float kMinStrength = 1000.0F;           // [grey^2] 3 grey values of noise then move a patch by 0.15 px
@@ -67,14 +65,10 @@ bool wider_than_noise(const GreyLevel& image, int u, int v) {
          static_cast<float>(y2) > kNoiseGrowth * static_cast<float>(y1);
 }
 
-// FAST's order, made independent of the order in which corners are found.
-bool stronger(const cv::KeyPoint& a, const cv::KeyPoint& b) {
-  if (a.response != b.response) return a.response > b.response;
-  return a.pt.y != b.pt.y ? a.pt.y < b.pt.y : a.pt.x < b.pt.x;
-}
-
 // Half a pixel right and down of a pixel lies the middle of an even patch that needs no interpolation.
-Eigen::Vector2f patch_centre(const cv::Point2f& pixel) { return {pixel.x + 0.5F, pixel.y + 0.5F}; }
+Eigen::Vector2f patch_centre(const FastCorner& corner) {
+  return {static_cast<float>(corner.u) + 0.5F, static_cast<float>(corner.v) + 0.5F};
+}
 
 }  // namespace
 
@@ -84,80 +78,78 @@ Detector::Detector(int width, int height, int max_features) : width_(width), hei
   columns_ = std::max(1, static_cast<int>(std::ceil(static_cast<float>(width) / cell_)));
   rows_ = std::max(1, static_cast<int>(std::ceil(static_cast<float>(height) / cell_)));
   min_distance_ = 0.4F * cell_;
+  count_.reserve(static_cast<std::size_t>(columns_ * rows_));
+  const auto most = static_cast<std::size_t>(std::max(max_features, 0));
+  occupied_.reserve(2 * most);
+  corners_.reserve(most);
 }
 
-std::vector<int> Detector::count_per_cell(const std::vector<Eigen::Vector2f>& pixels) const {
-  std::vector<int> count(static_cast<std::size_t>(columns_ * rows_), 0);
+void Detector::count_per_cell(const std::vector<Eigen::Vector2f>& pixels) {
+  count_.assign(static_cast<std::size_t>(columns_ * rows_), 0);
   for (const Eigen::Vector2f& pixel : pixels) {
     const int column = std::clamp(static_cast<int>(pixel.x() / cell_), 0, columns_ - 1);
     const int row = std::clamp(static_cast<int>(pixel.y() / cell_), 0, rows_ - 1);
-    ++count[static_cast<std::size_t>(row * columns_ + column)];
+    ++count_[static_cast<std::size_t>(row * columns_ + column)];
   }
-  return count;
 }
 
 // Where corners of a cell may lie: the cell, less the image's margin.
-cv::Rect Detector::area_of(std::size_t cell) const {
+PixelArea Detector::area_of(std::size_t cell) const {
   const int column = static_cast<int>(cell) % columns_;
   const int row = static_cast<int>(cell) / columns_;
   const auto edge = [&](int index) { return static_cast<int>(static_cast<float>(index) * cell_); };
-  const cv::Rect area(cv::Point(edge(column), edge(row)), cv::Point(edge(column + 1), edge(row + 1)));
-  return area & cv::Rect(kMargin, kMargin, width_ - 2 * kMargin, height_ - 2 * kMargin);
+  const int left = std::max(edge(column), kMargin);
+  const int top = std::max(edge(row), kMargin);
+  return {left, top, std::min(edge(column + 1), width_ - kMargin) - left,
+          std::min(edge(row + 1), height_ - kMargin) - top};
 }
 
-std::optional<Corner> Detector::best_in_cell(const ImagePyramid& pyramid, std::size_t cell,
-                                             const std::vector<Eigen::Vector2f>& occupied) const {
-  const cv::Rect area = area_of(cell);
-  if (area.empty()) return std::nullopt;
-  const cv::Rect searched(area.x - kFastReach, area.y - kFastReach, area.width + 2 * kFastReach,
-                          area.height + 2 * kFastReach);
-  const cv::Mat image = pyramid.image()(searched);
-  std::vector<cv::KeyPoint> found;
+std::optional<Corner> Detector::best_in_cell(const ImagePyramid& pyramid, std::size_t cell) {
+  const PixelArea area = area_of(cell);
+  if (area.width <= 0 || area.height <= 0) return std::nullopt;
+  fast_.find(pyramid, area, kThresholds.back());
   for (const int threshold : kThresholds) {
-    cv::FAST(image, found, threshold, true);
-    for (cv::KeyPoint& keypoint : found) keypoint.pt += cv::Point2f(searched.tl());
-    const auto too_close = [&](const cv::KeyPoint& keypoint) {
-      return !far_from_all(patch_centre(keypoint.pt), occupied, min_distance_);
-    };
-    found.erase(std::remove_if(found.begin(), found.end(), too_close), found.end());
-    const std::size_t candidates = std::min(found.size(), kCandidates);
-    std::partial_sort(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(candidates), found.end(), stronger);
-
-    Corner best;
-    for (std::size_t i = 0; i < candidates; ++i) {
-      const cv::Point2f& pt = found[i].pt;
-      const int u = static_cast<int>(pt.x);
-      const int v = static_cast<int>(pt.y);
-      const float strength = corner_strength(pyramid.level(0), u, v);
-      if (strength < kMinStrength || strength <= best.strength) continue;
-      if (!wider_than_noise(pyramid.level(0), u, v)) continue;
-      best = {patch_centre(pt), strength};
-    }
-    if (best.strength > 0.0F) return best;
+    const std::optional<Corner> best = best_of(pyramid, threshold);
+    if (best) return best;
   }
   return std::nullopt;
 }
 
-std::vector<Corner> Detector::detect(const ImagePyramid& pyramid, const std::vector<Eigen::Vector2f>& taken,
-                                     int wanted) {
-  std::vector<Corner> corners;
-  std::vector<Eigen::Vector2f> occupied = taken;
-  std::vector<int> count = count_per_cell(taken);
-  const std::size_t cells = count.size();
-  const auto enough = [&] { return static_cast<int>(corners.size()) >= wanted; };
+std::optional<Corner> Detector::best_of(const ImagePyramid& pyramid, int threshold) const {
+  Corner best;
+  std::size_t candidates = 0;
+  for (const FastCorner& corner : fast_.strongest_first()) {
+    if (corner.score < threshold || candidates == kCandidates) break;
+    if (!far_from_all(patch_centre(corner), occupied_, min_distance_)) continue;
+    ++candidates;
+    const float strength = corner_strength(pyramid.level(0), corner.u, corner.v);
+    if (strength < kMinStrength || strength <= best.strength) continue;
+    if (!wider_than_noise(pyramid.level(0), corner.u, corner.v)) continue;
+    best = {patch_centre(corner), strength};
+  }
+  return best.strength > 0.0F ? std::optional<Corner>(best) : std::nullopt;
+}
+
+const std::vector<Corner>& Detector::detect(const ImagePyramid& pyramid, const std::vector<Eigen::Vector2f>& taken,
+                                            int wanted) {
+  corners_.clear();
+  occupied_ = taken;
+  count_per_cell(taken);
+  const std::size_t cells = count_.size();
+  const auto enough = [&] { return static_cast<int>(corners_.size()) >= wanted; };
   for (int round = 0; round < kMaxPerCell && !enough(); ++round) {
     for (std::size_t k = 0; k < cells && !enough(); ++k) {
       const std::size_t cell = (next_ + k) % cells;
-      if (count[cell] != round) continue;
-      const std::optional<Corner> corner = best_in_cell(pyramid, cell, occupied);
+      if (count_[cell] != round) continue;
+      const std::optional<Corner> corner = best_in_cell(pyramid, cell);
       if (!corner) continue;
-      corners.push_back(*corner);
-      occupied.push_back(corner->pixel);
-      ++count[cell];
+      corners_.push_back(*corner);
+      occupied_.push_back(corner->pixel);
+      ++count_[cell];
     }
   }
   next_ = (next_ + cells / 3 + 1) % cells;
-  return corners;
+  return corners_;
 }
 
 }  // namespace ear

@@ -3,10 +3,10 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <opencv2/core/types.hpp>
 #include <optional>
 #include <vector>
 
+#include "frontend/fast_corners.h"
 #include "frontend/image_pyramid.h"
 
 namespace ear {
@@ -23,14 +23,15 @@ class Detector {
   Detector(int width, int height, int max_features);
 
   /// Up to `wanted` corners, far enough from each other and from the `taken` pixels; emptiest cells first, and in turn.
-  [[nodiscard]] std::vector<Corner> detect(const ImagePyramid& pyramid, const std::vector<Eigen::Vector2f>& taken,
-                                           int wanted);
+  /// Valid until the next call. Asks for no memory once every cell was searched.
+  [[nodiscard]] const std::vector<Corner>& detect(const ImagePyramid& pyramid,
+                                                  const std::vector<Eigen::Vector2f>& taken, int wanted);
 
  private:
-  [[nodiscard]] std::vector<int> count_per_cell(const std::vector<Eigen::Vector2f>& pixels) const;
-  [[nodiscard]] cv::Rect area_of(std::size_t cell) const;
-  [[nodiscard]] std::optional<Corner> best_in_cell(const ImagePyramid& pyramid, std::size_t cell,
-                                                   const std::vector<Eigen::Vector2f>& occupied) const;
+  void count_per_cell(const std::vector<Eigen::Vector2f>& pixels);
+  [[nodiscard]] PixelArea area_of(std::size_t cell) const;
+  [[nodiscard]] std::optional<Corner> best_in_cell(const ImagePyramid& pyramid, std::size_t cell);
+  [[nodiscard]] std::optional<Corner> best_of(const ImagePyramid& pyramid, int threshold) const;
 
   int width_;
   int height_;
@@ -39,6 +40,11 @@ class Detector {
   float cell_ = 1.0F;          // [px]
   float min_distance_ = 1.0F;  // [px]
   std::size_t next_ = 0;       // cell to begin with: a different one each time
+  FastCorners fast_;
+  // Kept for their memory.
+  std::vector<int> count_;
+  std::vector<Eigen::Vector2f> occupied_;
+  std::vector<Corner> corners_;
 };
 
 }  // namespace ear

@@ -66,12 +66,11 @@ struct Problem {
   double tolerance;
   double depth_sigma_unknown = kUnknownDepthSigma;
 
-  [[nodiscard]] Flags classify(const Transfer& motion) const {
-    Flags flags(flows.size());
+  void classify(const Transfer& motion, Flags& flags) const {
+    flags.resize(flows.size());
     std::transform(flows.begin(), flows.end(), flags.begin(), [&](const Flow& flow) {
       return std::uint8_t{squared_distance(flow, motion, depth_sigma_unknown) < tolerance * tolerance};
     });
-    return flags;
   }
 };
 
@@ -164,22 +163,24 @@ int trials_needed(std::size_t inliers, std::size_t all, std::size_t sample_size)
 
 struct Candidate {
   Transfer motion;
-  Flags flags;
+  Flags& flags;
   std::size_t inliers = 0;
 };
 
 // Draws samples, lets `solve` turn each into a motion, keeps the one with most inliers.
 template <std::size_t n, class Solve>
 void search(const Problem& problem, const std::vector<std::size_t>& from, std::mt19937& random, Solve&& solve,
-            Candidate& best) {
+            Candidate& best, Flags& trial_flags) {
   int trials = kMaxTrials;
   for (int trial = 0; trial < trials; ++trial) {
     const std::optional<Transfer> motion = solve(draw<n>(from, random));
     if (!motion) continue;
-    Flags flags = problem.classify(*motion);
-    const std::size_t inliers = count(flags);
+    problem.classify(*motion, trial_flags);
+    const std::size_t inliers = count(trial_flags);
     if (inliers <= best.inliers) continue;
-    best = {*motion, std::move(flags), inliers};
+    best.motion = *motion;
+    best.flags.swap(trial_flags);
+    best.inliers = inliers;
     trials = std::min(trials, trials_needed(inliers, problem.flows.size(), n));
   }
 }
@@ -199,23 +200,40 @@ Flags essential_inliers(const std::vector<Flow>& flows, double tolerance) {
 
 }  // namespace
 
-Consensus FlowCheck::find(const std::vector<Flow>& flows, const MotionGuess& guess) {
+void FlowCheck::reserve(std::size_t flows) {
+  result_.inliers.reserve(flows);
+  trial_.reserve(flows);
+  used_.reserve(flows);
+  indices_.reserve(flows);
+}
+
+const Consensus& FlowCheck::find(const std::vector<Flow>& flows, const MotionGuess& guess) {
+  result_.motion = guess.motion;
+  result_.metric = false;
+  find_into(flows, guess);
+  return result_;
+}
+
+void FlowCheck::find_into(const std::vector<Flow>& flows, const MotionGuess& guess) {
+  Flags& flags = result_.inliers;
   if (flows.size() < kMinFlows) {
-    Flags flags(flows.size(), std::uint8_t{guess.rotation_known});
-    drop_fixed(flows, guess, tolerance_, flags);
-    return {flags, guess.motion, false};
+    flags.assign(flows.size(), std::uint8_t{guess.rotation_known});
+    return drop_fixed(flows, guess, tolerance_, flags);
   }
-  std::vector<std::size_t> with_depth;
+  std::vector<std::size_t>& with_depth = indices_;
+  with_depth.clear();
   for (std::size_t i = 0; i < flows.size(); ++i) {
     if (flows[i].has_depth) with_depth.push_back(i);
   }
   const bool metric = with_depth.size() >= kMinDepths;
-  if (!metric && !guess.rotation_known) return {essential_inliers(flows, tolerance_), guess.motion, false};
+  if (!metric && !guess.rotation_known) {
+    flags = essential_inliers(flows, tolerance_);
+    return;
+  }
 
   Problem problem{flows, tolerance_};
-  Candidate best;
-  best.motion = guess.motion;
-  best.flags = problem.classify(best.motion);
+  Candidate best{guess.motion, flags};
+  problem.classify(best.motion, best.flags);
   best.inliers = count(best.flags);
   const auto enough = [&](std::size_t inliers) {
     return static_cast<double>(inliers) >= kGoodGuess * static_cast<double>(flows.size());
@@ -223,9 +241,10 @@ Consensus FlowCheck::find(const std::vector<Flow>& flows, const MotionGuess& gue
   const bool search_needed = !enough(best.inliers);
 
   if (!metric) {
-    if (!search_needed) return {best.flags, best.motion, false};
+    if (!search_needed) return;
     problem.depth_sigma_unknown = 1e3;  // the translation has unit length: depths have no unit
-    std::vector<std::size_t> all(flows.size());
+    std::vector<std::size_t>& all = indices_;
+    all.resize(flows.size());
     std::iota(all.begin(), all.end(), std::size_t{0});
     search<2>(
         problem, all, random_,
@@ -234,9 +253,8 @@ Consensus FlowCheck::find(const std::vector<Flow>& flows, const MotionGuess& gue
           if (!p) return std::nullopt;
           return Transfer{guess.motion.R_10, *p};
         },
-        best);
-    drop_fixed(flows, guess, tolerance_, best.flags);
-    return {best.flags, guess.motion, false};
+        best, trial_);
+    return drop_fixed(flows, guess, tolerance_, best.flags);
   }
 
   if (search_needed && guess.rotation_known) {
@@ -247,26 +265,31 @@ Consensus FlowCheck::find(const std::vector<Flow>& flows, const MotionGuess& gue
           if (!p) return std::nullopt;
           return Transfer{guess.motion.R_10, *p};
         },
-        best);
+        best, trial_);
   } else if (search_needed) {
     search<3>(
         problem, with_depth, random_,
         [&](const std::array<std::size_t, 3>& s) -> std::optional<Transfer> {
-          Flags used(flows.size(), 0);
-          for (const std::size_t i : s) used[i] = 1;
-          return refine(flows, used, guess.motion, 5);
+          used_.assign(flows.size(), 0);
+          for (const std::size_t i : s) used_[i] = 1;
+          return refine(flows, used_, guess.motion, 5);
         },
-        best);
+        best, trial_);
   }
   // Gyroscope and prediction are not perfect: let the inliers correct them, then decide.
   const std::optional<Transfer> refined = refine(flows, best.flags, best.motion, kRefinements);
   if (refined) {
-    Flags flags = problem.classify(*refined);
-    const std::size_t inliers = count(flags);
-    if (inliers >= best.inliers) best = {*refined, std::move(flags), inliers};
+    problem.classify(*refined, trial_);
+    const std::size_t inliers = count(trial_);
+    if (inliers >= best.inliers) {
+      best.motion = *refined;
+      best.flags.swap(trial_);
+      best.inliers = inliers;
+    }
   }
-  if (best.inliers < kMinFlows) return {Flags(flows.size(), 0), guess.motion, false};
-  return {best.flags, best.motion, best.inliers >= kMinDepths && 2 * best.inliers > flows.size()};
+  if (best.inliers < kMinFlows) return flags.assign(flows.size(), 0);
+  result_.motion = best.motion;
+  result_.metric = best.inliers >= kMinDepths && 2 * best.inliers > flows.size();
 }
 
 }  // namespace ear

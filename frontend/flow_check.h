@@ -40,14 +40,25 @@ class FlowCheck {
   /// `tolerance`: distance in normalized coordinates at which a feature stops being static.
   explicit FlowCheck(double tolerance) : tolerance_(tolerance) {}
 
+  /// Takes the memory for so many flows.
+  void reserve(std::size_t flows);
+
   /// With too few flows to measure it, the motion is the guess; all are inliers if its rotation is known, else none is.
   /// Where no depths tell the motion, flows of length zero that a fully known guess would have moved, whatever their
   /// depth, are no inliers: what they show moves with the camera.
-  [[nodiscard]] Consensus find(const std::vector<Flow>& flows, const MotionGuess& guess);
+  /// Valid until the next call. Asks for no memory with up to as many flows as were reserved, unless neither rotation
+  /// nor depths are known.
+  [[nodiscard]] const Consensus& find(const std::vector<Flow>& flows, const MotionGuess& guess);
 
  private:
+  void find_into(const std::vector<Flow>& flows, const MotionGuess& guess);
+
   double tolerance_;
   std::mt19937 random_{20240607};  // fixed seed: the same images give the same features
+  Consensus result_;
+  // Kept for their memory.
+  std::vector<std::uint8_t> trial_, used_;
+  std::vector<std::size_t> indices_;
 };
 
 }  // namespace ear

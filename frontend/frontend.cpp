@@ -86,7 +86,7 @@ class Frontend::Impl {
 
  private:
   void track(const MotionPrediction& prediction);
-  [[nodiscard]] MotionGuess track_probes(const MotionGuess& guess, std::vector<std::uint8_t>& done);
+  [[nodiscard]] MotionGuess track_probes(const MotionGuess& guess);
   [[nodiscard]] bool track_one(Track& track, const Transfer& motion, int level) const;
   [[nodiscard]] Flow flow(std::size_t track) const;
   void reject();
@@ -96,7 +96,7 @@ class Frontend::Impl {
   void refresh_patches();
   void drop(const std::vector<std::uint8_t>& keep);
   [[nodiscard]] MotionGuess camera_motion(const MotionPrediction& prediction) const;
-  [[nodiscard]] std::vector<Eigen::Vector2f> pixels() const;
+  void allocate();
   void write_output(TimeNs t_ns);
 
   FrontendConfig config_;
@@ -118,6 +118,11 @@ class Frontend::Impl {
   std::vector<std::size_t> free_patches_;
   std::uint64_t next_id_ = 0;
   FeatureFrame output_;
+  // Kept for their memory: after the first frames, process() asks for none.
+  std::vector<std::uint8_t> keep_;
+  std::vector<std::size_t> candidates_, probes_;
+  std::vector<Flow> flows_;
+  std::vector<Eigen::Vector2f> pixels_;
 };
 
 Frontend::Impl::Impl(const FrontendConfig& config, std::vector<CameraCalibration> cameras)
@@ -125,13 +130,30 @@ Frontend::Impl::Impl(const FrontendConfig& config, std::vector<CameraCalibration
       cameras_(std::move(cameras)),
       lens_(first_of(cameras_)),
       detector_(cameras_.front().width, cameras_.front().height, std::max(config.max_features, 1)),
-      flow_check_(kFlowTolerancePx / lens_.focal_px()) {
+      flow_check_(kFlowTolerancePx / lens_.focal_px()),
+      left_(image_kernels(config.kernels)),
+      right_(image_kernels(config.kernels), StereoMatcher::kLevels) {
   if (config_.max_features < 1) throw std::invalid_argument("frontend: max_features must be positive");
   if (!(config_.nearest_depth > 0.0)) throw std::invalid_argument("frontend: nearest_depth must be positive");
   if (cameras_.size() > 1) stereo_.emplace(cameras_[0], cameras_[1], config_.nearest_depth);
-  patches_.resize(static_cast<std::size_t>(config_.max_features));
+  allocate();
   set_limits(config_.max_features, true);
   reset();
+}
+
+void Frontend::Impl::allocate() {
+  const auto most = static_cast<std::size_t>(config_.max_features);
+  patches_.resize(most);
+  tracks_.reserve(most);
+  previous_.reserve(most);
+  free_patches_.reserve(most);
+  output_.features.reserve(most);
+  keep_.reserve(most);
+  candidates_.reserve(most);
+  probes_.reserve(most);
+  flows_.reserve(most);
+  pixels_.reserve(most);
+  flow_check_.reserve(most);
 }
 
 void Frontend::Impl::reset() {
@@ -188,12 +210,13 @@ MotionGuess Frontend::Impl::camera_motion(const MotionPrediction& prediction) co
 void Frontend::Impl::track(const MotionPrediction& prediction) {
   previous_ = tracks_;
   if (tracks_.size() > max_features_) {  // there were more: older ones come first
-    std::vector<std::uint8_t> oldest(tracks_.size(), 0);
-    std::fill_n(oldest.begin(), max_features_, std::uint8_t{1});
-    drop(oldest);
+    keep_.assign(tracks_.size(), 0);
+    std::fill_n(keep_.begin(), max_features_, std::uint8_t{1});
+    drop(keep_);
   }
-  std::vector<std::uint8_t> keep(tracks_.size(), 0);
-  motion_ = track_probes(camera_motion(prediction), keep);
+  std::vector<std::uint8_t>& keep = keep_;
+  keep.assign(tracks_.size(), 0);
+  motion_ = track_probes(camera_motion(prediction));
   const int known = motion_.rotation_known ? kLevelPredicted : kLevelUnknown;
   for (std::size_t i = 0; i < tracks_.size(); ++i) {
     if (keep[i]) continue;
@@ -213,28 +236,28 @@ void Frontend::Impl::track(const MotionPrediction& prediction) {
 
 // Follows a few features from coarse to fine. If they agree on a motion, it is better than any prediction, and all
 // others are found at once on the finest level.
-MotionGuess Frontend::Impl::track_probes(const MotionGuess& guess, std::vector<std::uint8_t>& done) {
-  std::vector<std::size_t> candidates;
+MotionGuess Frontend::Impl::track_probes(const MotionGuess& guess) {
+  candidates_.clear();
+  probes_.clear();
+  flows_.clear();
   for (std::size_t i = 0; i < tracks_.size(); ++i) {
-    if (tracks_[i].has_depth) candidates.push_back(i);
+    if (tracks_[i].has_depth) candidates_.push_back(i);
   }
-  const std::size_t stride = std::max<std::size_t>(1, candidates.size() / kProbes);
-  std::vector<std::size_t> probes;
-  std::vector<Flow> flows;
-  for (std::size_t k = 0; k < candidates.size(); k += stride) {
-    const std::size_t i = candidates[k];
+  const std::size_t stride = std::max<std::size_t>(1, candidates_.size() / kProbes);
+  for (std::size_t k = 0; k < candidates_.size(); k += stride) {
+    const std::size_t i = candidates_[k];
     Track& track = tracks_[i];
     if (!track_one(track, guess.motion, guess.rotation_known ? kLevelPredicted : kLevelUnknown) &&
         !track_one(track, guess.motion, kLevelUnknown)) {
       continue;
     }
-    probes.push_back(i);
-    flows.push_back(flow(i));
+    probes_.push_back(i);
+    flows_.push_back(flow(i));
   }
-  const Consensus consensus = flow_check_.find(flows, guess);
-  for (std::size_t k = 0; k < probes.size(); ++k) {
-    done[probes[k]] = consensus.inliers[k];
-    if (!consensus.inliers[k]) tracks_[probes[k]] = previous_[probes[k]];  // to be tried again like the others
+  const Consensus& consensus = flow_check_.find(flows_, guess);
+  for (std::size_t k = 0; k < probes_.size(); ++k) {
+    keep_[probes_[k]] = consensus.inliers[k];
+    if (!consensus.inliers[k]) tracks_[probes_[k]] = previous_[probes_[k]];  // to be tried again like the others
   }
   if (!consensus.metric) return guess;
   return {consensus.motion, true, true};
@@ -269,10 +292,9 @@ Flow Frontend::Impl::flow(std::size_t track) const {
 }
 
 void Frontend::Impl::reject() {
-  std::vector<Flow> flows;
-  flows.reserve(tracks_.size());
-  for (std::size_t i = 0; i < tracks_.size(); ++i) flows.push_back(flow(i));
-  drop(flow_check_.find(flows, motion_).inliers);
+  flows_.clear();
+  for (std::size_t i = 0; i < tracks_.size(); ++i) flows_.push_back(flow(i));
+  drop(flow_check_.find(flows_, motion_).inliers);
 }
 
 void Frontend::Impl::match_stereo() {
@@ -307,8 +329,9 @@ void Frontend::Impl::refresh_patches() {
 
 void Frontend::Impl::detect() {
   const int wanted = static_cast<int>(max_features_) - static_cast<int>(tracks_.size());
-  const std::vector<Corner> corners = detector_.detect(left_, pixels(), wanted);
-  for (const Corner& corner : corners) {
+  pixels_.clear();
+  for (const Track& track : tracks_) pixels_.push_back(track.left.centre);
+  for (const Corner& corner : detector_.detect(left_, pixels_, wanted)) {
     const auto ray = lens_.to_normalized(corner.pixel.cast<double>());
     if (!ray) continue;
     Track track;
@@ -336,13 +359,6 @@ void Frontend::Impl::drop(const std::vector<std::uint8_t>& keep) {
   }
   tracks_.resize(kept);
   previous_.resize(kept);
-}
-
-std::vector<Eigen::Vector2f> Frontend::Impl::pixels() const {
-  std::vector<Eigen::Vector2f> all;
-  all.reserve(tracks_.size());
-  for (const Track& track : tracks_) all.push_back(track.left.centre);
-  return all;
 }
 
 void Frontend::Impl::write_output(TimeNs t_ns) {

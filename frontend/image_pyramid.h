@@ -3,27 +3,24 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <memory>
-#include <opencv2/core/mat.hpp>
 #include <vector>
 
 #include "ear/types.h"
+#include "frontend/grey_level.h"
+#include "frontend/image_kernels.h"
 
 namespace ear {
-
-/// One level of a pyramid. A pixel (u, v) of the image is at (u, v) / 2^level here.
-struct GreyLevel {
-  const std::uint8_t* origin = nullptr;  ///< pixel (0, 0)
-  int width = 0;
-  int height = 0;
-  std::ptrdiff_t stride = 0;
-  int border = 0;  ///< mirrored pixels that may be read on each side
-};
 
 class ImagePyramid {
  public:
   static constexpr int kMaxLevels = 4;  ///< the image and three halvings; small images have fewer
   static constexpr int kBorder = 16;    ///< [px] on every level
+
+  /// `levels`: at most so many are built.
+  explicit ImagePyramid(const ImageKernels& kernels = image_kernels(Kernels::best), int levels = kMaxLevels)
+      : kernels_(kernels), max_levels_(levels) {}
+  ImagePyramid(ImagePyramid&&) = default;
+  ImagePyramid& operator=(ImagePyramid&&) = default;
 
   /// Copies the image and builds all levels. Memory is kept from one image to the next.
   void build(const ImageView& image);
@@ -38,12 +35,18 @@ class ImagePyramid {
 
   [[nodiscard]] const GreyLevel& level(int index) const { return levels_[static_cast<std::size_t>(index)]; }
 
-  /// The image itself, for library calls.
-  [[nodiscard]] const cv::Mat& image() const { return mats_.front(); }
+  /// What it was built with, and patches of it are.
+  [[nodiscard]] const ImageKernels& kernels() const { return kernels_; }
 
  private:
-  std::vector<cv::Mat> mats_;
-  std::vector<GreyLevel> levels_;
+  void allocate(int width, int height);
+
+  ImageKernels kernels_;
+  int max_levels_;
+  std::vector<GreyLevel> levels_;     // none before the first image
+  std::vector<GreyLevel> allocated_;  // for images of the size that was there last
+  std::vector<std::vector<std::uint8_t>> memory_;
+  std::vector<std::uint16_t> sums_;  // of a row
 };
 
 }  // namespace ear

@@ -5,10 +5,10 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 #include <optional>
 
-#include "frontend/image_pyramid.h"
+#include "frontend/grey_level.h"
+#include "frontend/image_kernels.h"
 
 namespace ear {
 
@@ -20,15 +20,12 @@ struct Warp {
   Eigen::Vector2f perspective = Eigen::Vector2f::Zero();  ///< how the scale shrinks along the patch [1/px]
 };
 
-/// A patch at one level of a pyramid. Offsets of its pixels from the centre are -7.5, -6.5, ... 7.5.
+/// A patch at one level of a pyramid. All variants of the kernels give the same bits.
 class PatchLevel {
  public:
-  static constexpr int kSize = 16;
-  static constexpr float kHalf = 0.5F * (kSize - 1);
-
   /// Takes the patch around `centre` [px of this level]. False if it reaches outside the level's border or has no
   /// texture in one direction; the patch is then unusable.
-  bool capture(const GreyLevel& level, const Eigen::Vector2f& centre);
+  bool capture(const ImageKernels& kernels, const GreyLevel& level, const Eigen::Vector2f& centre);
 
   /// Smaller eigenvalue of the patch's structure matrix [grey^2]: the variance of the image noise divided by it is the
   /// variance of the patch's position along the direction that it sees worst [px^2].
@@ -41,32 +38,31 @@ class PatchLevel {
 
   /// One Gauss-Newton step of the position, `scale` times as long; nothing if the patch leaves the image or does not
   /// correlate with it.
-  [[nodiscard]] std::optional<Step> step_position(const GreyLevel& level, float scale, Warp& warp) const;
+  [[nodiscard]] std::optional<Step> step_position(const ImageKernels& kernels, const GreyLevel& level, float scale,
+                                                  Warp& warp) const;
 
   /// One Gauss-Newton step of position and affine map. The map is held near `prior`, so that a patch which does
   /// not show some direction of it (an edge) keeps what is known.
-  [[nodiscard]] std::optional<Step> step_affine(const GreyLevel& level, const Eigen::Matrix2f& prior, float scale,
-                                                Warp& warp) const;
+  [[nodiscard]] std::optional<Step> step_affine(const ImageKernels& kernels, const GreyLevel& level,
+                                                const Eigen::Matrix2f& prior, float scale, Warp& warp) const;
 
   /// Zero-mean normalized correlation of every second row with the image, to compare places; nothing if the patch
   /// leaves the image.
-  [[nodiscard]] std::optional<float> correlate(const GreyLevel& level, const Warp& warp) const;
+  [[nodiscard]] std::optional<float> correlate(const ImageKernels& kernels, const GreyLevel& level,
+                                               const Warp& warp) const;
 
  private:
-  static constexpr int kPixels = kSize * kSize;
-  using Pixels = std::array<float, kPixels>;
   using Vector6f = Eigen::Matrix<float, 6, 1>;
   using Matrix6f = Eigen::Matrix<float, 6, 6>;
 
-  // Fills everything below from value and gradients. False if the patch has no texture in one direction.
-  bool solve_normal_equations();
+  // Fills everything below from the pixels. False if the patch has no texture in one direction.
+  bool solve_normal_equations(const ImageKernels& kernels);
 
   // Order of the parameters: position x, y; affine xx, xy, yx, yy.
-  alignas(16) Pixels value_;  // mean removed
-  alignas(16) Pixels gradient_x_;
-  alignas(16) Pixels gradient_y_;
-  float mean_ = 0.0F;
-  float energy_ = 0.0F;  // sum of value^2
+  PatchPixels pixels_;
+  float energy_ = 0.0F;           // sum of value^2
+  float middle_ = 0.0F;           // sums over the rows that correlate() compares: value
+  float middle_variance_ = 0.0F;  // and its square, less the mean
   float corner_strength_ = 0.0F;
   Vector6f J_sum_;    // J^T 1
   Vector6f J_value_;  // J^T value

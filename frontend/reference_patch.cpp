@@ -52,7 +52,7 @@ bool ReferencePatch::capture(const ImagePyramid& pyramid, const Eigen::Vector2f&
   usable_.fill(false);
   for (int level = 0; level <= pyramid.top_level(); ++level) {
     const auto i = static_cast<std::size_t>(level);
-    usable_[i] = levels_[i].capture(pyramid.level(level), pixel / static_cast<float>(1 << level));
+    usable_[i] = levels_[i].capture(pyramid.kernels(), pyramid.level(level), pixel / static_cast<float>(1 << level));
   }
   return usable_.front();
 }
@@ -60,7 +60,7 @@ bool ReferencePatch::capture(const ImagePyramid& pyramid, const Eigen::Vector2f&
 std::optional<float> ReferencePatch::correlate(const ImagePyramid& pyramid, const Warp& warp, int level) const {
   const auto i = static_cast<std::size_t>(level);
   if (!usable_[i]) return std::nullopt;
-  return levels_[i].correlate(pyramid.level(level), scaled(warp, level));
+  return levels_[i].correlate(pyramid.kernels(), pyramid.level(level), scaled(warp, level));
 }
 
 std::optional<ReferencePatch::Match> ReferencePatch::align(const ImagePyramid& pyramid, const Warp& start,
@@ -71,7 +71,7 @@ std::optional<ReferencePatch::Match> ReferencePatch::align(const ImagePyramid& p
     if (!usable_[i]) continue;
     Warp coarse = scaled(warp, level);
     const auto settled = settle(kCoarseSteps, kCoarseSettled, [&](float scale) {
-      return levels_[i].step_position(pyramid.level(level), scale, coarse);
+      return levels_[i].step_position(pyramid.kernels(), pyramid.level(level), scale, coarse);
     });
     if (settled) warp.centre = coarse.centre * static_cast<float>(1 << level);
   }
@@ -80,11 +80,13 @@ std::optional<ReferencePatch::Match> ReferencePatch::align(const ImagePyramid& p
   const GreyLevel& image = pyramid.level(0);
   // A start on the base level is close enough for the full step.
   const auto placed = start_level == 0 ? std::optional<PatchLevel::Step>(PatchLevel::Step{})
-                                       : settle(kPositionSteps, kPositionSettled,
-                                                [&](float scale) { return base.step_position(image, scale, warp); });
+                                       : settle(kPositionSteps, kPositionSettled, [&](float scale) {
+                                           return base.step_position(pyramid.kernels(), image, scale, warp);
+                                         });
   if (!placed) return std::nullopt;
-  const auto settled = settle(kAffineSteps, kAffineSettled,
-                              [&](float scale) { return base.step_affine(image, start.affine, scale, warp); });
+  const auto settled = settle(kAffineSteps, kAffineSettled, [&](float scale) {
+    return base.step_affine(pyramid.kernels(), image, start.affine, scale, warp);
+  });
   if (!settled || !plausible(warp.affine)) return std::nullopt;
   if (settled->moved.norm() > kMaxUnsettled || settled->correlation < kMinCorrelation) return std::nullopt;
   return Match{warp, settled->correlation};

@@ -2,14 +2,14 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <stdexcept>
-#include <vector>
 
 namespace ear {
 namespace {
 
-constexpr int kSearchLevel = 2;
+constexpr int kSearchLevel = StereoMatcher::kLevels - 1;
 constexpr int kRefineLevel = 1;
 constexpr double kSearchStepPx = 4.0;          // on the base image: one pixel of the search level
 constexpr double kMaxDisparityShare = 0.2;     // of the image's width
@@ -20,6 +20,37 @@ constexpr double kMaxEpipolarPx = 2.5;         // calibrations are off by more t
 constexpr double kMinDisparityPx = -0.7;       // noise of a point at infinity
 constexpr double kMaxDepthJumpPx = 1.5;        // disparity against what was carried over, plus
 constexpr double kMaxDepthJumpShare = 0.1;     // this share of the disparity
+
+// The two highest peaks of a line of correlations, the higher one first.
+template <class Hypothesis>
+class Peaks {
+ public:
+  void add(const Hypothesis& next) {
+    if (last_ && rising_ && last_->correlation > next.correlation) keep(*last_);
+    rising_ = !last_ || next.correlation >= last_->correlation;
+    last_ = next;
+  }
+  void end() {
+    if (last_ && rising_) keep(*last_);
+  }
+  /// Those that are missing have a correlation of -1.
+  [[nodiscard]] const std::array<Hypothesis, 2>& best() const { return best_; }
+
+ private:
+  void keep(const Hypothesis& peak) {
+    if (!(peak.correlation > kMinSearchCorrelation)) return;
+    if (peak.correlation > best_[0].correlation) {
+      best_[1] = best_[0];
+      best_[0] = peak;
+    } else if (peak.correlation > best_[1].correlation) {
+      best_[1] = peak;
+    }
+  }
+
+  std::optional<Hypothesis> last_;
+  bool rising_ = false;  // the last one is not below the one before
+  std::array<Hypothesis, 2> best_;
+};
 
 }  // namespace
 
@@ -89,28 +120,19 @@ std::optional<StereoMatch> StereoMatcher::search(const ImagePyramid& right, cons
   };
   const int level = std::min(kSearchLevel, right.top_level());
 
-  std::vector<Hypothesis> line;
+  Peaks<Hypothesis> peaks;
   const double step = kSearchStepPx * inverse_depth_per_pixel_;
   for (double inverse_depth = 0.0; inverse_depth <= max_inverse_depth_; inverse_depth += step) {
     const auto pixel = project(left, inverse_depth);
     if (!pixel) continue;
     const auto correlation = patch.correlate(right, at(*pixel), level);
-    if (correlation) line.push_back({inverse_depth, *pixel, *correlation});
+    if (correlation) peaks.add({*pixel, *correlation});
   }
-  std::vector<Hypothesis> peaks;
-  for (std::size_t i = 0; i < line.size(); ++i) {
-    const bool over_last = i == 0 || line[i].correlation >= line[i - 1].correlation;
-    const bool over_next = i + 1 == line.size() || line[i].correlation > line[i + 1].correlation;
-    if (over_last && over_next && line[i].correlation > kMinSearchCorrelation) peaks.push_back(line[i]);
-  }
-  const std::size_t kept = std::min<std::size_t>(peaks.size(), 2);
-  std::partial_sort(peaks.begin(), peaks.begin() + static_cast<std::ptrdiff_t>(kept), peaks.end(),
-                    [](const Hypothesis& a, const Hypothesis& b) { return a.correlation > b.correlation; });
-  peaks.resize(kept);
-  if (kept == 2 && peaks[1].correlation < peaks[0].correlation - kRivalMargin) peaks.pop_back();
+  peaks.end();
 
   std::optional<ReferencePatch::Match> best;
-  for (const Hypothesis& peak : peaks) {
+  for (const Hypothesis& peak : peaks.best()) {
+    if (peak.correlation < peaks.best()[0].correlation - kRivalMargin) continue;  // also where there is none
     const auto match = patch.align(right, at(peak.pixel), kRefineLevel);
     if (!match) continue;
     if (!best) {

@@ -21,6 +21,8 @@ struct StereoMatch {
 
 class StereoMatcher {
  public:
+  static constexpr int kLevels = 3;  ///< of the right image's pyramid that are looked at
+
   /// `nearest_depth` [m]: closer points are not searched for.
   StereoMatcher(const CameraCalibration& left, const CameraCalibration& right, double nearest_depth);
 
@@ -39,7 +41,6 @@ class StereoMatcher {
 
  private:
   struct Hypothesis {
-    double inverse_depth = 0.0;
     Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
     float correlation = -1.0F;
   };

@@ -3,7 +3,8 @@ ear_target(doctest_main)
 target_link_libraries(doctest_main PUBLIC doctest::doctest)
 
 # What `tools/test --asan` builds and runs: the unit tests of these folders, their ctest label is `sanitized` too.
-set(EAR_SANITIZED_FOLDERS ear filter frontend recording ros2 rosbag2 odometry smoother evaluation fuzz)
+set(EAR_SANITIZED_FOLDERS ear filter frontend recording ros2 rosbag2 odometry smoother evaluation view
+    fuzz)
 add_custom_target(sanitized_tests)
 
 # ear_register(TARGET NAME LABEL TIMEOUT): what all tests have in common.

@@ -103,12 +103,12 @@ TEST_CASE("patch: one step goes most of the way, whatever the exposure") {
     for (const float u : columns) {
       const Eigen::Vector2f at(u, 120.5F);
       PatchLevel patch;
-      REQUIRE(patch.capture(before.level(0), at));
+      REQUIRE(patch.capture(before.kernels(), before.level(0), at));
       Warp warp{at, Eigen::Matrix2f::Identity()};
-      REQUIRE(patch.step_position(after.level(0), 1.0F, warp));
+      REQUIRE(patch.step_position(after.kernels(), after.level(0), 1.0F, warp));
       position_error += (warp.centre - at - shift).norm() / columns.size();
       warp = {at, Eigen::Matrix2f::Identity()};
-      REQUIRE(patch.step_affine(after.level(0), Eigen::Matrix2f::Identity(), 1.0F, warp));
+      REQUIRE(patch.step_affine(after.kernels(), after.level(0), Eigen::Matrix2f::Identity(), 1.0F, warp));
       affine_error += (warp.centre - at - shift).norm() / columns.size();
     }
     CHECK(position_error < 0.1F);

@@ -111,7 +111,8 @@ TEST_CASE("stereo: what is followed tells how the surface leans") {
     const StereoMatcher matcher(pair.cameras[0], pair.cameras[1], kNearest);
     const Lens lens(pair.cameras[0]);
     std::vector<double> gradients;
-    for (const Corner& corner : Detector(320, 240, 100).detect(pair.left, {}, 100)) {
+    Detector detector(320, 240, 100);
+    for (const Corner& corner : detector.detect(pair.left, {}, 100)) {
       ReferencePatch patch;
       const auto ray = lens.to_normalized(corner.pixel.cast<double>());
       if (!ray || ray->y() < 0.2 || !patch.capture(pair.left, corner.pixel)) continue;

@@ -1,0 +1,46 @@
+#include "frontend/fast_corners.h"
+
+#include <algorithm>
+
+namespace ear {
+namespace {
+
+constexpr int kBlock = 32;  // the kernel writes whole blocks
+
+bool peak(const std::uint8_t* score, std::ptrdiff_t stride) {
+  const int s = *score;
+  return s > score[-1] && s > score[1] && s > score[-stride - 1] && s > score[-stride] && s > score[1 - stride] &&
+         s > score[stride - 1] && s > score[stride] && s > score[stride + 1];
+}
+
+bool stronger(const FastCorner& a, const FastCorner& b) {
+  if (a.score != b.score) return a.score > b.score;
+  return a.v != b.v ? a.v < b.v : a.u < b.u;
+}
+
+}  // namespace
+
+void FastCorners::find(const ImagePyramid& pyramid, const PixelArea& area, int threshold) {
+  const GreyLevel& image = pyramid.level(0);
+  const std::ptrdiff_t stride = (area.width + kBlock - 1) / kBlock * kBlock + 2;
+  scores_.assign(static_cast<std::size_t>(stride * (area.height + 2)), 0);
+  std::uint8_t* const first = scores_.data() + stride + 1;
+  for (int row = 0; row < area.height; ++row) {
+    std::uint8_t* const out = first + row * stride;
+    pyramid.kernels().corner_scores(image.origin + (area.top + row) * image.stride + area.left, image.stride,
+                                    area.width, out);
+    std::fill(out + area.width, out + stride - 1, std::uint8_t{0});
+  }
+  found_.clear();
+  found_.reserve(static_cast<std::size_t>((area.width + 1) / 2 * ((area.height + 1) / 2)));  // no two are neighbours
+  for (int row = 0; row < area.height; ++row) {
+    const std::uint8_t* const score = first + row * stride;
+    for (int column = 0; column < area.width; ++column) {
+      if (score[column] < threshold || !peak(score + column, stride)) continue;
+      found_.push_back({area.left + column, area.top + row, score[column]});
+    }
+  }
+  std::sort(found_.begin(), found_.end(), stronger);
+}
+
+}  // namespace ear

@@ -1,0 +1,15 @@
+// What this program is: for bug reports, and beside measurements.
+#pragma once
+
+#include <string>
+
+namespace ear::tools {
+
+/// Of the sources; with "-changed" where these differed from it; "unknown" where they were built without their history.
+[[nodiscard]] std::string commit();
+
+/// Lines: version and commit; the kernels that the front end takes here, and all that this processor can run; the
+/// optional parts that were built.
+[[nodiscard]] std::string version_text();
+
+}  // namespace ear::tools
