@@ -87,6 +87,7 @@ void Filter::propagate_to(const FeatureFrame& frame) {
   sources_.look_at(frame, t_ns, ingest_, ekf_);
   if (ekf_.running()) {
     consistency_ = consistency_check_(sources_.displacements(frame, t_ns, ingest_, ekf_, sources_.ground().known()));
+    sources_.score_imu(frame, consistency_, ekf_);
     sources_.advance(t_ns, advise(consistency_, health_.health(), config_.anomaly), ingest_, ekf_, records_);
   }
   if (!ekf_.running() || health_.lost()) {

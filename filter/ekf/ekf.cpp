@@ -53,7 +53,8 @@ void Ekf::reset() {
   bias_changes_ = BiasChanges{};
 }
 
-std::optional<TimeNs> Ekf::propagate(const ImuBuffer& samples, TimeNs t_ns, double weight, double normal_walk) {
+std::optional<TimeNs> Ekf::propagate(const ImuBuffer& samples, TimeNs t_ns, const ImuNoiseFactors& usual,
+                                     double normal_walk) {
   std::optional<TimeNs> uncertain_ns;
   if (t_ns <= state_.imu.t_ns) return uncertain_ns;
   std::optional<ErrorTransition> total;
@@ -61,8 +62,10 @@ std::optional<TimeNs> Ekf::propagate(const ImuBuffer& samples, TimeNs t_ns, doub
   samples.for_each_piece(
       state_.imu.t_ns, t_ns,
       [&](const Eigen::Vector3d& gyro_B, const Eigen::Vector3d& accel_B, double dt, const ImuNoiseFactors& factors) {
-        const ImuCalibration noise = with_factors(calibration_.imu, {factors.gyro, factors.accel / weight});
-        if (noise.gyro_noise * std::sqrt(dt) > kUncertainTurn && !uncertain_ns) uncertain_ns = state_.imu.t_ns;
+        const ImuCalibration noise =
+            with_factors(calibration_.imu, {factors.gyro * usual.gyro, factors.accel * usual.accel});
+        if (factors.gyro * calibration_.imu.gyro_noise * std::sqrt(dt) > kUncertainTurn && !uncertain_ns)
+          uncertain_ns = state_.imu.t_ns;
         const ErrorTransition step = error_transition(state_.imu, gyro_B, accel_B, dt, noise);
         if (total) {
           chain(*total, step);

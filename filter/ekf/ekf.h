@@ -49,9 +49,9 @@ class Ekf {
   [[nodiscard]] std::optional<TimeNs> time() const { return running_ ? std::optional(state_.imu.t_ns) : std::nullopt; }
 
   /// To `t_ns`, by the samples. The time of the first one, if any, that may be off by more than noise (clipped).
-  /// `weight` (15): the noise of the accelerometer is divided by it. `normal_walk`: how the ground's normal turns
-  /// [rad/sqrt(m)].
-  std::optional<TimeNs> propagate(const ImuBuffer& samples, TimeNs t_ns, double weight, double normal_walk);
+  /// `usual`: factors on the noise of all samples. `normal_walk`: how the ground's normal turns [rad/sqrt(m)].
+  std::optional<TimeNs> propagate(const ImuBuffer& samples, TimeNs t_ns, const ImuNoiseFactors& usual,
+                                  double normal_walk);
 
   /// The gate: one row of ground columns against what the state and its own noise allow.
   template <typename Row>

@@ -35,6 +35,7 @@ ImuMotion imu_motion(const ImuState& x, const ImuBuffer& samples, TimeNs to_ns, 
   H_end.middleCols<3>(err::theta) = -R_BW * skew(end.p_WB);
   H_end.middleCols<3>(err::rho) = R_BW;
   motion.H = H_end * error.Phi - H_end;
+  motion.turn_variance = error.Q(err::theta, err::theta);
   motion.covariance = H_end * error.Q * H_end.transpose();
   return motion;
 }
@@ -42,8 +43,7 @@ ImuMotion imu_motion(const ImuState& x, const ImuBuffer& samples, TimeNs to_ns, 
 Displacement imu_displacement(const ImuMotion& motion, const Covariance& P) {
   Displacement result;
   result.p_BiBj = motion.p_BiBj;
-  result.covariance = motion.H * P.matrix().topLeftCorner<err::imu_size, err::imu_size>() * motion.H.transpose();
-  result.covariance += motion.covariance;
+  result.covariance = motion.by_state(P) + motion.covariance;
   result.available = motion.duration > 0.0 && result.p_BiBj.allFinite() && result.covariance.allFinite();
   return result;
 }

@@ -18,6 +18,12 @@ struct ImuMotion {
   Eigen::Matrix3d R_BiBj = Eigen::Matrix3d::Identity();
   Eigen::Matrix<double, 3, err::imu_size> H = Eigen::Matrix<double, 3, err::imu_size>::Zero();  ///< p by the error at i
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< of p, by the noise of the samples meanwhile [m^2]
+  double turn_variance = 0.0;                            ///< of R, one axis, by the same [rad^2]
+
+  /// Covariance of p by the error at i, whose covariance is `P` [m^2].
+  [[nodiscard]] Eigen::Matrix3d by_state(const Covariance& P) const {
+    return H * P.matrix().topLeftCorner<err::imu_size, err::imu_size>() * H.transpose();
+  }
 };
 
 /// Integrates the samples from x.t_ns to `to_ns`.

@@ -6,9 +6,7 @@
 namespace ear {
 namespace {
 
-constexpr double kMemory = 0.15;        // [s] measured: 0.4 s costs 5 to 30 % where wheels slip; docs/decisions/0018
 constexpr double kPrior = 4.0;          // innovations that the usual noise counts for; measured: 4 to 16 differ little
-constexpr double kFarthest = 1e6;       // chosen: one innovation's square over the usual variance counts as no more
 constexpr double kFitting = 1.0 / 3.0;  // chosen: the least weight of a sensor that fits, three standard deviations
 constexpr int kIterations = 3;          // of the two equations of the belief; more change nothing that matters
 
@@ -23,14 +21,14 @@ double NoiseScore::factor(double square, double count) const {
 double NoiseScore::add(double residual, const Expected& expected, TimeNs t_ns) {
   const double dt = last_ns_ ? std::max(0.0, seconds_between(*last_ns_, t_ns)) : 0.0;
   last_ns_ = t_ns;
-  const double kept = std::exp(-dt / kMemory);
+  const double kept = std::exp(-dt / memory_);
   squares_ *= kept;
   count_ *= kept;
   double believed = factor(0.0, 0.0);
   double square = 0.0;
   for (int i = 0; i < kIterations; ++i) {
     const double share = believed * expected.noise / (expected.state + believed * expected.noise);
-    square = std::min((residual * residual * share + expected.state) * share / expected.noise, kFarthest);
+    square = std::min((residual * residual * share + expected.state) * share / expected.noise, farthest_);
     believed = factor(square, 1.0);
   }
   squares_ += square;

@@ -13,6 +13,14 @@ namespace ear {
 
 class NoiseScore {
  public:
+  /// [s] measured: 0.4 s costs 5 to 30 % where wheels slip; docs/decisions/0018
+  static constexpr double kShortMemory = 0.15;
+
+  NoiseScore() = default;
+  /// `memory` [s]: how long innovations count. `farthest`: one innovation's square over the usual variance counts as no
+  /// more.
+  NoiseScore(double memory, double farthest) : memory_(memory), farthest_(farthest) {}
+
   /// What an innovation is compared with: the variances of its parts.
   struct Expected {
     double state = 0.0;      ///< by the state's error
@@ -35,8 +43,10 @@ class NoiseScore {
  private:
   [[nodiscard]] double factor(double square, double count) const;
 
-  double squares_ = 0.0;  ///< of past noises over the usual variance, recent ones
-  double count_ = 0.0;    ///< how many they are
+  double memory_ = kShortMemory;
+  double farthest_ = 1e6;  // chosen: a reading may be as wrong as it likes
+  double squares_ = 0.0;   ///< of past noises over the usual variance, recent ones
+  double count_ = 0.0;     ///< how many they are
   std::optional<TimeNs> last_ns_;
 };
 

@@ -21,7 +21,7 @@ void RotationCheck::add(const FrameAgreement& seen, double interval, bool wheels
   const double share = 1.0 - std::exp(-interval / kTurnMemory);
   if (wheels_rejected) misled_ns_ = t_ns;
   const bool misled = misled_ns_ && seconds_between(*misled_ns_, t_ns) < kMisled;
-  const bool known = !misled && seen.turn_sigma > 0.0 && seen.left < ImageHealth::kManyOff && !seen.frozen;
+  const bool known = !misled && seen.turn_known && seen.left < ImageHealth::kManyOff && !seen.frozen;
   const Eigen::Vector3d rate = known ? Eigen::Vector3d(seen.turn / interval) : Eigen::Vector3d::Zero();
   // How far the rates scatter, vibration and timing included, and what is left of it in their mean.
   const double off = std::min((rate - rate_).norm(), kMostScatter);

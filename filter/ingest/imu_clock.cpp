@@ -15,8 +15,7 @@ constexpr double kLongestWait = 0.25;      // [s]
 constexpr double kShare = 0.5;             // of the jump: readings that are off by less did not jump
 constexpr int kVotes = 2;                  // readings, for a verdict
 constexpr std::size_t kFewest = 3;         // samples after the jump: one false stamp is none
-constexpr double kReview = 1.0;            // [s] in which a verdict may be undone,
-constexpr int kContradictions = 8;         // by so many readings in a row
+constexpr double kReview = 5.0;            // [s] in which a verdict may be undone
 constexpr double kMemory = 100.0;          // samples, readings
 
 }  // namespace

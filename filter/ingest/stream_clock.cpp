@@ -39,8 +39,23 @@ void StreamClock::follow(TimeNs t_ns, std::optional<TimeNs> now_ns) {
   suspect_ns_.reset();
 }
 
+/// A process that stood still gets the readings of one sensor before those of the other, which looks like a jump until
+/// both have caught up.
+bool StreamClock::shift_was_wrong(TimeNs stamp_ns, TimeNs now_ns) {
+  const double own = seconds_between(now_ns, stamp_ns) - ahead_;
+  const double shifted = own - 1e-9 * static_cast<double>(shift_ns_);
+  const bool against = shift_ns_ != 0 && is_clock_jump(shifted) && std::abs(own) < kShare * std::abs(shifted);
+  contradictions_ = against ? contradictions_ + 1 : 0;
+  return contradictions_ >= kContradictions;
+}
+
 std::optional<TimeNs> StreamClock::correct(TimeNs stamp_ns, std::optional<TimeNs> now_ns) {
   if (!is_time(stamp_ns)) return stamp_ns;  // for the input guard to refuse
+  if (now_ns && shift_was_wrong(stamp_ns, *now_ns)) {
+    shift_ns_ = 0;
+    contradictions_ = 0;
+    last_ns_.reset();
+  }
   TimeNs t_ns = stamp_ns - shift_ns_;
   if (count_ >= kToKnow && now_ns && last_ns_ && last_now_ns_) {
     const double jump = jump_at(t_ns, *now_ns);

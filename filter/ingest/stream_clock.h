@@ -1,6 +1,7 @@
 // The clock of a sensor beside the inertial one. Where its stamps jump, and its readings do not come in otherwise than
-// before, the jump is taken out. Readings that come late keep their steps, those that are missing leave their time out
-// in both: neither is a jump. docs/ingest.md.
+// before, the jump is taken out; put back where the sensor's own stamps turn out to be where they always were. Readings
+// that come late keep their steps, those that are missing leave their time out in both: neither is a jump.
+// docs/ingest.md.
 #pragma once
 
 #include <cmath>
@@ -12,6 +13,7 @@ namespace ear {
 
 inline constexpr double kClockJump = 0.04;        ///< [s] either way; less may be a driver that was held up
 inline constexpr double kLargestClockJump = 5.0;  ///< [s] beyond that it is another clock
+inline constexpr int kContradictions = 8;         ///< readings in a row, to put back what was taken out
 
 /// Of any sensor. `off`: by how much a stamp is off the place where it should be [s].
 [[nodiscard]] inline bool is_clock_jump(double off) {
@@ -29,6 +31,7 @@ class StreamClock {
  private:
   [[nodiscard]] double jump_at(TimeNs t_ns, TimeNs now_ns) const;
   void follow(TimeNs t_ns, std::optional<TimeNs> now_ns);
+  [[nodiscard]] bool shift_was_wrong(TimeNs stamp_ns, TimeNs now_ns);
 
   TimeNs shift_ns_ = 0;            ///< the sensor's clock less the common one
   std::optional<TimeNs> last_ns_;  ///< of the stamps that followed, corrected
@@ -38,6 +41,7 @@ class StreamClock {
   double ahead_ = 0.0;                ///< [s] of the inertial samples, usually
   int count_ = 0;                     ///< of those
   int jumps_ = 0;
+  int contradictions_ = 0;  ///< readings in a row against the shift
 };
 
 }  // namespace ear

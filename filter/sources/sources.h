@@ -12,6 +12,7 @@
 #include "filter/ingest/ingest.h"
 #include "filter/sources/cameras/cameras.h"
 #include "filter/sources/ground/ground.h"
+#include "filter/sources/imu_score.h"
 #include "filter/sources/standstill/standstill.h"
 #include "filter/sources/wheels/wheels.h"
 
@@ -31,11 +32,13 @@ class Sources {
   }
 
   /// A frame at `t_ns` (IMU time), before anything is done with it: how exact it is, and whether the vehicle stands.
-  void look_at(const FeatureFrame& frame, TimeNs t_ns, const Ingest& ingest, const Ekf& ekf);
+  void look_at(const FeatureFrame& frame, TimeNs t_ns, const Ingest& ingest, Ekf& ekf);
   /// p^I, p^o and p^c of (13), from the state to `t_ns`, each by one sensor alone. `ground_known`: the state's normal
   /// is one that the lasers have seen.
   [[nodiscard]] Displacements displacements(const FeatureFrame& frame, TimeNs t_ns, const Ingest& ingest,
                                             const Ekf& ekf, bool ground_known);
+  /// After it: how noisy the inertial sensors are by what the images show of the same motion, where these are sound.
+  void score_imu(const FeatureFrame& frame, const Consistency& consistency, const Ekf& ekf);
   /// Propagates to `t_ns`, with wheels (5)-(8) and lasers (2)-(4) in between: each at its own time, or, if the state
   /// has passed that already, where the state was then.
   void advance(TimeNs t_ns, const Advice& advice, Ingest& ingest, Ekf& ekf, Records& records);
@@ -66,6 +69,8 @@ class Sources {
 
   ImuCalibration imu_;
   double normal_walk_;  ///< [rad/sqrt(m)]; 0 without wheels
+  ImuScore imu_score_;
+  ImuMotion motion_;  ///< from the state to the frame at hand
   std::optional<Wheels> wheels_;
   Ground ground_;
   Cameras cameras_;

@@ -136,7 +136,7 @@ std::optional<ImuState> MovingStart::solve(const ImuBuffer& imu) const {
     const double scale = kScaleSigma * motion.p_B0B1.norm();
     const double unsteady = kAccelSigma * (t1 - t0) * (t1 - t0);
     const double variance =
-        motion.covariance.trace() / 3.0 + kPathSigma * kPathSigma + scale * scale + unsteady * unsteady;
+        motion.p_covariance().trace() / 3.0 + kPathSigma * kPathSigma + scale * scale + unsteady * unsteady;
     A += H.transpose() * H / variance;
     b += H.transpose() * z / variance;
     cost += z.squaredNorm() / variance;

@@ -64,7 +64,7 @@ struct OdometerConfig {
   double side_slip = 2e-3;       ///< across it [m/sqrt(m)]
   double side_slip_turn = 5e-3;  ///< across it, while turning [m/s per rad/s]
   double roughness = 4e-3;       ///< through the ground [m/sqrt(m)]
-  bool scores = true;            ///< wheels and beams that do not fit weigh less; off in ablations only
+  bool scores = true;            ///< wheels, beams, inertial sensors that do not fit weigh less; off in ablations
   double body_pitch = 3e-2;      ///< without lasers: the body against its path, up and down [rad sqrt(s)]
   double body_yaw = 2.5e-3;      ///< the same to the sides [rad sqrt(s)]
   double speed_sigma = 1e-3;     ///< [m/s] every row, also of standing wheels

@@ -61,6 +61,8 @@ class Odometry {
   [[nodiscard]] Health health() const;
   [[nodiscard]] InputCounts input_counts() const;
   [[nodiscard]] StageTimes stage_times() const;
+  /// Of the last image that was looked at; none before the first.
+  [[nodiscard]] FeatureFrame features() const;
 
   /// The calibration in use: what was given, with what was learned while running.
   [[nodiscard]] Calibration calibration() const;

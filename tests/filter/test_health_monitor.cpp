@@ -258,7 +258,7 @@ TEST_CASE(
     CAPTURE(apparent);
     Drive drive;
     drive.frame.agreement.matches = 100;
-    drive.frame.agreement.turn_sigma = 1e-4;
+    drive.frame.agreement.turn_known = true;
     drive.frame.agreement.apparent_rate = apparent;
     drive.go_on(5.0);
     drive.frame.agreement.turn = Eigen::Vector3d(0.0, 0.0, 0.03 * 0.05);  // 0.03 rad/s

@@ -82,7 +82,7 @@ TEST_CASE("stereo motion: with noise the error is about what the covariance says
     const auto motion = stereo_motion(matched(pair), cameras(), StereoMotion{}, kSigma);
     REQUIRE(motion);
     const Eigen::Vector3d e = motion->p_B0B1 - 0.2 * kWay;
-    sum += e.dot(motion->covariance.ldlt().solve(e)) / 100.0;
+    sum += e.dot(motion->p_covariance().ldlt().solve(e)) / 100.0;
   }
   CHECK(sum > 1.5);
   CHECK(sum < 7.0);  // 3, and what the depths share that the sums take as independent
@@ -109,28 +109,36 @@ TEST_CASE("stereo motion: images the wrong way round tell nothing") {
 
 TEST_CASE("frame check: the right motion fits, a wrong one does not") {
   const Pair pair = look(exp_so3(kTurn), kWay, kSigma, 5);
-  FrameCheck check(kSigma, kGate);
-  const FrameAgreement right = check.compare(pair.from, pair.to, {exp_so3(kTurn), kWay, 0.0}, cameras());
+  const FrameCheck check(kSigma, kGate);
+  const FrameAgreement right = check.compare(matched(pair), {exp_so3(kTurn), kWay, 0.0}, cameras());
   CHECK(right.matches == 100);
   CHECK(right.left < 0.05);
   CHECK(right.right < 0.05);
-  CHECK(right.turn.norm() < 5.0 * right.turn_sigma);
   const FrameAgreement wrong =
-      check.compare(pair.from, pair.to, {Eigen::Matrix3d::Identity(), Eigen::Vector3d::Zero(), 0.0}, cameras());
+      check.compare(matched(pair), {Eigen::Matrix3d::Identity(), Eigen::Vector3d::Zero(), 0.0}, cameras());
   CHECK(wrong.left > 0.9);
 }
 
 TEST_CASE("frame check: what turns a little more than predicted shows in the turn, not in the share") {
   const Eigen::Vector3d more(0.0005, -0.0003, 0.0007);
-  FrameCheck check(kSigma, kGate);
+  const FrameCheck check(kSigma, kGate);
+  const Eigen::Matrix3d p_is_known = Eigen::Matrix3d::Identity() * 1e-10;
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  double squares = 0.0;
   for (unsigned seed = 0; seed < 50; ++seed) {
     const Pair pair = look(exp_so3(kTurn) * exp_so3(more), 0.2 * kWay, kSigma, seed);
-    const FrameAgreement a = check.compare(pair.from, pair.to, {exp_so3(kTurn), 0.2 * kWay, 0.0}, cameras());
-    CHECK(a.left < 0.1);
-    mean += a.turn / 50.0;
+    CHECK(check.compare(matched(pair), {exp_so3(kTurn), 0.2 * kWay, 0.0}, cameras()).left < 0.1);
+    const auto motion = stereo_motion(matched(pair), cameras(), StereoMotion{}, kSigma);
+    REQUIRE(motion);
+    const ExcessTurn turn = turn_beyond(*motion, exp_so3(kTurn), 0.2 * kWay, p_is_known);
+    CHECK(turn.covariance.trace() < motion->covariance.topLeftCorner<3, 3>().trace());
+    mean += turn.value / 50.0;
+    const Eigen::Vector3d e = turn.value - more;
+    squares += e.dot(turn.covariance.ldlt().solve(e)) / 50.0;
   }
   CHECK((mean - more).norm() < 2e-4);
+  CHECK(squares > 1.5);
+  CHECK(squares < 9.0);  // 3 times what ImuScore multiplies the covariance by
 }
 
 TEST_CASE("frame check: swapped images are seen at once") {

@@ -92,6 +92,21 @@ TEST_CASE("filter: standing for a minute it stays where it is") {
   CHECK(run.back().estimate.frame.clones <= 1);  // standing fills no window with copies
 }
 
+TEST_CASE("filter: biases learned at rest are less certain once the vehicle moves and shakes") {
+  const simulator::Simulation simulation = simulate("flat1", 4.0);
+  Filter filter(FilterConfig{}, simulation.calibration());
+  double at_rest = 0.0, moving = 0.0;  // [rad/s] of the gyroscope, last at rest and first in motion
+  for (const EvaluatedEstimate& e : run_filter(filter, simulation)) {
+    const double sigma = std::sqrt(e.estimate.covariance(estimate_error::gyro_bias, estimate_error::gyro_bias));
+    if (e.estimate.frame.standing) at_rest = sigma;
+    if (!e.estimate.frame.standing && at_rest > 0.0 && moving == 0.0) moving = sigma;
+  }
+  REQUIRE(at_rest > 0.0);
+  REQUIRE(moving > 0.0);
+  CHECK(moving > 1.1 * at_rest);
+  CHECK(moving < std::hypot(at_rest, 6e-4));
+}
+
 TEST_CASE("filter: follows a drive, with both cameras and with one") {
   const simulator::Simulation simulation = simulate("flat1", 25.0);
   Filter stereo(FilterConfig{}, simulation.calibration());

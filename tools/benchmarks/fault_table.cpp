@@ -273,10 +273,11 @@ class Causes {
     }
   }
 
-  /// Did what is not trusted err a moment ago?
-  [[nodiscard]] bool explain(const Change& change) const {
+  /// Did what is named at fault err a moment ago? Not asked of what was named `before` and still is.
+  [[nodiscard]] bool explain(const Change& change, const SourceSet& before) const {
     for (std::size_t source = 0; source < kSourceCount; ++source) {
-      if (change.faulty[source] && !errs(static_cast<Source>(source), change.t)) return false;
+      const bool named = change.faulty[source] && !before[source];
+      if (named && !errs(static_cast<Source>(source), change.t)) return false;
     }
     return change.status != HealthStatus::lost;
   }
@@ -344,13 +345,15 @@ Alarms listen(const simulator::Simulation& simulation, const FilterConfig& confi
   alarms.lost = alarms.log.lost;
   bool complained = false;
   bool founded = true;
+  SourceSet named;
   for (const Change& change : alarms.log.changes) {
     if (change.complains()) {
-      founded = (!complained || founded) && causes.explain(change);
+      founded = (!complained || founded) && causes.explain(change, named);
     } else if (complained) {
       ++(founded ? alarms.founded : alarms.unfounded);
     }
     complained = change.complains();
+    named = change.faulty;
   }
   if (complained) ++(founded ? alarms.founded : alarms.unfounded);
   return alarms;

@@ -13,8 +13,9 @@ namespace {
 constexpr double kBridgeRotation = 2e-3;  // [rad] chosen: standard deviations with which two images show the motion:
 constexpr double kBridgePosition = 5e-3;  // [m] well above what the features will show later
 constexpr int kBridgeRows = 6;
-constexpr double kApparent = 3.0;         // standard deviations of the cameras' calibration that look like a turn
-constexpr double kOldImage = 0.5;         // [s] chosen: after which frames have little in common
+constexpr double kApparent = 3.0;  // standard deviations of the cameras' calibration that look like a turn
+constexpr double kLooser = 4.0;    // a wrong distance must not look like a turn: it may be wrong by more than it should
+constexpr double kOldImage = 0.5;  // [s] chosen: after which frames have little in common
 constexpr double kComparedStep = 1e-4;    // [rad, m] chosen: a tenth of what two images show
 constexpr double kRecent = 0.3;           // [s] chosen: an image shows the motion for so long
 constexpr std::size_t kFewFeatures = 10;  // chosen: fewer show too little of the motion, as for health
@@ -32,10 +33,12 @@ Cameras::Cameras(const FilterConfig& config, const Calibration& calibration)
       frame_check_(config.feature_sigma_px / focal_px_, Gate(config.gate_probability, 2)),
       rows_(kBridgeRows, err::clone(config.window + 1)) {
   last_features_.features.reserve(kFeatureCapacity);
-  compared_.features.reserve(kFeatureCapacity);
+  compared_.before.features.reserve(kFeatureCapacity);
 }
 
 void Cameras::measure_noise(const FeatureFrame& frame, const CameraState& cameras) {
+  compared_.matched_ns.reset();
+  compared_.seen.reset();
   noise_ = 1.0;
   if (count_ < 2) return;
   const double ratio = image_noise_.measure(frame, cameras) * focal_px_ / config_.feature_sigma_px;
@@ -44,17 +47,20 @@ void Cameras::measure_noise(const FeatureFrame& frame, const CameraState& camera
 
 Displacement Cameras::displacement(const FeatureFrame& frame, TimeNs t_ns, const ImuMotion& motion, const Ekf& ekf) {
   Displacement result;
-  if (ekf.state().imu.t_ns == compared_ns_) {  // else the frame before was not where the state is
-    const std::vector<StereoMatch>& matches = matches_.find(compared_, frame);
-    const std::optional<StereoMotion> seen =
-        stereo_motion(matches, ekf.state().camera, {motion.R_BiBj, motion.p_BiBj}, feature_sigma(), kComparedStep);
-    result.available = seen.has_value();
-    result.contradictory = !seen && matches.size() >= kFewestMatches;
-    if (seen) result.p_BiBj = seen->p_B0B1;
-    if (seen) result.covariance = seen->covariance;
+  if (ekf.state().imu.t_ns == compared_.t_ns) {  // else the frame before was not where the state is
+    const std::vector<StereoMatch>& matches = matches_.find(compared_.before, frame);
+    compared_.matched_ns = compared_.before.t_ns;
+    StereoMotion start;
+    start.R_B0B1 = motion.R_BiBj;
+    start.p_B0B1 = motion.p_BiBj;
+    compared_.seen = stereo_motion(matches, ekf.state().camera, start, feature_sigma(), kComparedStep);
+    result.available = compared_.seen.has_value();
+    result.contradictory = !compared_.seen && matches.size() >= kFewestMatches;
+    if (compared_.seen) result.p_BiBj = compared_.seen->p_B0B1;
+    if (compared_.seen) result.covariance = compared_.seen->p_covariance();
   }
-  compared_ns_ = t_ns;
-  compared_ = frame;
+  compared_.t_ns = t_ns;
+  compared_.before = frame;
   return result;
 }
 
@@ -73,6 +79,13 @@ Pose Cameras::motion_since_image(const State& x) const {
   return {T_WB0.R.transpose() * x.imu.R_WB, T_WB0.R.transpose() * (x.imu.p_WB - T_WB0.p)};
 }
 
+const std::vector<StereoMatch>& Cameras::matches_with(const FeatureFrame& frame) {
+  if (compared_.matched_ns == last_->t_ns) return matches_.found();
+  compared_.matched_ns = last_->t_ns;
+  compared_.seen.reset();
+  return matches_.find(last_features_, frame);
+}
+
 bool Cameras::bridge(const FeatureFrame& frame, Ekf& ekf) {
   const State& x = ekf.state();
   if (!last_ || count_ < 2 || x.clones.empty()) return false;
@@ -80,14 +93,13 @@ bool Cameras::bridge(const FeatureFrame& frame, Ekf& ekf) {
   StereoMotion start;
   start.R_B0B1 = moved.R;
   start.p_B0B1 = moved.p;
-  const std::optional<StereoMotion> motion =
-      stereo_motion(matches_.find(last_features_, frame), x.camera, start, feature_sigma());
+  const std::optional<StereoMotion> motion = stereo_motion(matches_with(frame), x.camera, start, feature_sigma());
   if (!motion) return false;
   const int newest = static_cast<int>(x.clones.size()) - 1;
   const RelativeMotionRows rows = linearize_relative_motion(x, newest, {motion->R_B0B1, motion->p_B0B1});
   const Eigen::Matrix3d R_WB0 = x.clones.back().T_WB.R;
-  const Eigen::Matrix3d covariance =
-      R_WB0 * motion->covariance * R_WB0.transpose() + kBridgePosition * kBridgePosition * Eigen::Matrix3d::Identity();
+  const Eigen::Matrix3d covariance = R_WB0 * motion->p_covariance() * R_WB0.transpose() +
+                                     kBridgePosition * kBridgePosition * Eigen::Matrix3d::Identity();
   const Eigen::LLT<Eigen::Matrix3d> llt(covariance);
   auto H = rows_.topLeftCorner(kBridgeRows, err::clone(newest) + err::clone_size);
   H.setZero();
@@ -120,7 +132,14 @@ FrameAgreement Cameras::compare(const FeatureFrame& frame, const Ekf& ekf) {
   if (last_ && dt <= kOldImage) {
     const Pose moved = motion_since_image(x);
     const double sigma_v = std::sqrt(ekf.covariance().matrix().diagonal().segment<3>(err::nu).maxCoeff());
-    agreement = frame_check_.compare(last_features_, frame, {moved.R, moved.p, dt * sigma_v}, x.camera, noise_);
+    const double sigma_p = dt * sigma_v;
+    agreement = frame_check_.compare(matches_with(frame), {moved.R, moved.p, sigma_p}, x.camera, noise_);
+    if (compared_.seen) {
+      const Eigen::Matrix3d loose = Eigen::Matrix3d::Identity() * std::pow(kLooser * sigma_p, 2);
+      const ExcessTurn turn = turn_beyond(*compared_.seen, moved.R, moved.p, loose);
+      agreement.turn = turn.value;
+      agreement.turn_known = true;
+    }
     agreement.apparent_rate = apparent_rate(dt, ekf);
   }
   agreement.noise = noise_;
@@ -169,7 +188,7 @@ bool Cameras::show_motion(const State& x) const {
 void Cameras::reset() {
   tracks_.clear();
   window_.reset();
-  compared_ns_ = 0;
+  compared_.t_ns = 0;
   if (last_) last_->clone.reset();
 }
 

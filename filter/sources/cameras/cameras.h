@@ -41,6 +41,8 @@ class Cameras {
   /// p^c of (13). `motion`: by the inertial samples, from where the state is to the frame at `t_ns` (IMU time).
   [[nodiscard]] Displacement displacement(const FeatureFrame& frame, TimeNs t_ns, const ImuMotion& motion,
                                           const Ekf& ekf);
+  /// The motion that it is of.
+  [[nodiscard]] const std::optional<StereoMotion>& seen() const { return compared_.seen; }
 
   /// Where the inertial samples since the last image may be wrong by more than noise (clipped, missing, stamps that
   /// jumped), the two images show how the body moved, roughly: later, the features of both will show it in full, around
@@ -70,9 +72,19 @@ class Cameras {
   void reset();
 
  private:
+  /// The frame at hand against the one before.
+  struct Compared {
+    FeatureFrame before;               ///< that displacement() last saw,
+    TimeNs t_ns = 0;                   ///< at this IMU time
+    std::optional<TimeNs> matched_ns;  ///< stamp of the frame that matches_ holds the features of, and of this one
+    std::optional<StereoMotion> seen;  ///< between these two
+  };
+
   /// Of one observation in the newest frame, normalized.
   [[nodiscard]] double feature_sigma() const { return noise_ * config_.feature_sigma_px / focal_px_; }
   [[nodiscard]] Pose motion_since_image(const State& x) const;
+  /// Of the last image that was used with the frame at hand.
+  const std::vector<StereoMatch>& matches_with(const FeatureFrame& frame);
   [[nodiscard]] double apparent_rate(double dt, const Ekf& ekf) const;
   void marginalise(std::optional<std::size_t> clone, Ekf& ekf);
 
@@ -86,8 +98,7 @@ class Cameras {
   double noise_ = 1.0;  ///< standard deviation of the features of the frame at hand, times the usual
   FrameCheck frame_check_;
   StereoMatches matches_;
-  FeatureFrame compared_;   ///< that displacement() last saw,
-  TimeNs compared_ns_ = 0;  ///< at this IMU time
+  Compared compared_;
   std::optional<LastImage> last_;
   FeatureFrame last_features_;
   Eigen::MatrixXd rows_;  // memory that is used again

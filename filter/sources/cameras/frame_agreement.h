@@ -16,7 +16,7 @@ struct FrameAgreement {
   bool right_skipped = false;  ///< nobody looked at that of the second camera
   bool frozen = false;         ///< the image is exactly the one before
   Eigen::Vector3d turn = Eigen::Vector3d::Zero();  ///< by which the vehicle turned more than predicted [rad], in B
-  double turn_sigma = 0.0;                         ///< [rad] its standard deviation, the worst axis; 0: not known
+  bool turn_known = false;
 };
 
 }  // namespace ear

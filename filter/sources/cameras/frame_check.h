@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <vector>
 
 #include "ear/types.h"
 #include "filter/ekf/gate.h"
@@ -28,13 +29,13 @@ class FrameCheck {
   /// `noise`: of the features, times the usual.
   [[nodiscard]] double share_behind(const FeatureFrame& frame, const CameraState& cameras, double noise = 1.0) const;
 
-  [[nodiscard]] FrameAgreement compare(const FeatureFrame& from, const FeatureFrame& to, const PredictedMotion& motion,
-                                       const CameraState& cameras, double noise = 1.0);
+  /// `matches`: of the frame before with this one.
+  [[nodiscard]] FrameAgreement compare(const std::vector<StereoMatch>& matches, const PredictedMotion& motion,
+                                       const CameraState& cameras, double noise = 1.0) const;
 
  private:
   double sigma_;
   Gate gate_;
-  StereoMatches matches_;
 };
 
 }  // namespace ear

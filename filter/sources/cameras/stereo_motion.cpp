@@ -156,13 +156,22 @@ std::optional<StereoMotion> stereo_motion(const std::vector<StereoMatch>& matche
     if (ldlt.info() != Eigen::Success || !step.allFinite()) return std::nullopt;
     motion.R_B0B1 = motion.R_B0B1 * exp_so3(step.head<3>());
     motion.p_B0B1 += step.tail<3>();
-    motion.covariance = ldlt.solve(Eigen::Matrix<double, 6, 6>::Identity()).bottomRightCorner<3, 3>();
+    motion.covariance = ldlt.solve(Eigen::Matrix<double, 6, 6>::Identity());
     if (step.norm() < settled) break;
   }
   const bool together =
       motion.fitting >= static_cast<int>(kFewestMatches) && motion.fitting >= kLeastShare * motion.matches;
   if (!together || !(motion.covariance.diagonal().minCoeff() > 0.0)) return std::nullopt;
   return motion;
+}
+
+ExcessTurn turn_beyond(const StereoMotion& seen, const Eigen::Matrix3d& R_B0B1, const Eigen::Vector3d& p_B0B1,
+                       const Eigen::Matrix3d& p_covariance) {
+  const Eigen::Matrix3d by_p = seen.covariance.topRightCorner<3, 3>();
+  const Eigen::LDLT<Eigen::Matrix3d> p_ldlt(seen.p_covariance() + p_covariance);
+  const Eigen::Matrix3d gain = p_ldlt.solve(by_p.transpose()).transpose();
+  return {log_so3(R_B0B1.transpose() * seen.R_B0B1) - gain * (seen.p_B0B1 - p_B0B1),
+          seen.covariance.topLeftCorner<3, 3>() - gain * by_p.transpose()};
 }
 
 }  // namespace ear

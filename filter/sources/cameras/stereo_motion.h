@@ -25,6 +25,7 @@ class StereoMatches {
 
   /// The features of both frames; valid until the next call.
   const std::vector<StereoMatch>& find(const FeatureFrame& from, const FeatureFrame& to);
+  [[nodiscard]] const std::vector<StereoMatch>& found() const { return matches_; }
 
  private:
   std::vector<const FeatureObservation*> earlier_;  ///< those of `from`, by id
@@ -42,11 +43,24 @@ inline constexpr std::size_t kFewestMatches = 12;
 /// The motion from frame 0 to frame 1.
 struct StereoMotion {
   Eigen::Matrix3d R_B0B1 = Eigen::Matrix3d::Identity();
-  Eigen::Vector3d p_B0B1 = Eigen::Vector3d::Zero();          ///< [m]
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();  ///< of p_B0B1 [m^2]
+  Eigen::Vector3d p_B0B1 = Eigen::Vector3d::Zero();  ///< [m]
+  /// Of a turn in B1 [rad], and of p_B0B1 [m].
+  Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Identity();
   int matches = 0;
   int fitting = 0;  ///< of these
+
+  [[nodiscard]] Eigen::Matrix3d p_covariance() const { return covariance.bottomRightCorner<3, 3>(); }
 };
+
+/// By how much the body turned more than predicted, in B1 [rad].
+struct ExcessTurn {
+  Eigen::Vector3d value = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();
+};
+/// What the images show of the turn if the displacement is as predicted, to within `p_covariance`. Alone, a fit takes
+/// some of the displacement for a turn, since the depths are noisy.
+[[nodiscard]] ExcessTurn turn_beyond(const StereoMotion& seen, const Eigen::Matrix3d& R_B0B1,
+                                     const Eigen::Vector3d& p_B0B1, const Eigen::Matrix3d& p_covariance);
 
 /// Least squares over rotation and translation: the points seen in frame 0, projected into both cameras of frame 1.
 /// Observations further off than `huber` standard deviations weigh less. `sigma`: one observation, normalized; `start`:

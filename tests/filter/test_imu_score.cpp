@@ -1,0 +1,114 @@
+#include "filter/sources/imu_score.h"
+
+#include <doctest/doctest.h>
+
+#include <Eigen/Cholesky>
+#include <random>
+
+#include "filter/ekf/so3.h"
+
+using namespace ear;
+
+namespace {
+
+double gyro_score(const ImuScore& score) { return 1.0 / score.noise().gyro; }
+double accel_score(const ImuScore& score) { return 1.0 / score.noise().accel; }
+
+constexpr TimeNs kFrame = 33'333'333;
+const double kTurnSigma = 1e-4;   // [rad] of the gyroscope over a frame, as stated
+const double kShiftSigma = 1e-3;  // [m] of the accelerometer
+
+/// What the images' fit says of its own errors: a turn and a displacement that are hard to tell apart.
+Eigen::Matrix<double, 6, 6> covariance_of_images() {
+  Eigen::Matrix<double, 6, 1> sigma;
+  sigma << 1e-4, 1.5e-4, 1e-4, 5e-4, 5e-4, 5e-4;
+  Eigen::Matrix<double, 6, 6> correlation = Eigen::Matrix<double, 6, 6>::Identity();
+  correlation(1, 3) = correlation(3, 1) = 0.9;
+  correlation(0, 4) = correlation(4, 0) = -0.9;
+  return sigma.asDiagonal() * correlation * sigma.asDiagonal();
+}
+
+/// The score after `seconds` with inertial noise of so many times the stated one. `bias`: of every displacement that
+/// the images show, along their least certain direction.
+ImuScore score_after(double seconds, double gyro, double accel, double bias, unsigned seed) {
+  std::mt19937_64 rng{seed};
+  std::normal_distribution<double> normal;
+  const auto draw = [&](int n) { return Eigen::VectorXd::NullaryExpr(n, [&] { return normal(rng); }).eval(); };
+  Covariance P(err::clones);
+  P.reset(Eigen::VectorXd::Zero(err::clones));
+  const Eigen::Matrix<double, 6, 6> C = covariance_of_images();
+  const Eigen::Matrix<double, 6, 6> L = C.llt().matrixL();
+  ImuScore score(true);
+  for (TimeNs t_ns = 0; t_ns < static_cast<TimeNs>(1e9 * seconds); t_ns += kFrame) {
+    ImuMotion motion;
+    motion.duration = 1.0 / 30.0;
+    motion.R_BiBj = exp_so3(gyro * kTurnSigma * draw(3));
+    motion.p_BiBj = accel * kShiftSigma * draw(3);
+    motion.covariance = Eigen::Matrix3d::Identity() * kShiftSigma * kShiftSigma;
+    motion.turn_variance = kTurnSigma * kTurnSigma;
+    const Eigen::VectorXd off = L * draw(6) + bias / C(3, 3) * C.col(3);
+    StereoMotion images;
+    images.R_B0B1 = exp_so3(off.head<3>());
+    images.p_B0B1 = off.tail<3>();
+    images.covariance = C;
+    images.matches = images.fitting = 100;
+    score.add(motion, images, P, t_ns);
+  }
+  return score;
+}
+
+}  // namespace
+
+TEST_CASE("imu score: sensors as good as stated keep their noise") {
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    const ImuScore score = score_after(10.0, 1.0, 1.0, 0.0, seed);
+    CHECK(gyro_score(score) > 0.9);
+    CHECK(accel_score(score) > 0.9);
+  }
+}
+
+TEST_CASE("imu score: noise beyond the data sheet is found, in the sensor that has it") {
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    const ImuScore gyro = score_after(10.0, 5.0, 1.0, 0.0, seed);
+    CHECK(gyro.noise().gyro > 3.5);
+    CHECK(gyro.noise().gyro < 6.0);
+    CHECK(accel_score(gyro) > 0.9);
+    const ImuScore accel = score_after(10.0, 1.0, 6.0, 0.0, seed);
+    CHECK(accel.noise().accel > 4.0);
+    CHECK(accel.noise().accel < 7.5);
+    CHECK(gyro_score(accel) > 0.75);
+  }
+}
+
+TEST_CASE(
+    "imu score: a displacement that the images show wrongly, with a turn to match, is no noise of the gyroscope") {
+  for (unsigned seed = 1; seed <= 10; ++seed) CHECK(gyro_score(score_after(10.0, 1.0, 1.0, 1.5e-3, seed)) > 0.85);
+}
+
+TEST_CASE("imu score: one image that is wrong changes little, and those in which something moves nothing") {
+  ImuScore score = score_after(10.0, 1.0, 1.0, 0.0, 1);
+  Covariance P(err::clones);
+  P.reset(Eigen::VectorXd::Zero(err::clones));
+  ImuMotion motion;
+  motion.duration = 1.0 / 30.0;
+  motion.covariance = Eigen::Matrix3d::Identity() * kShiftSigma * kShiftSigma;
+  motion.turn_variance = kTurnSigma * kTurnSigma;
+  StereoMotion images;
+  images.R_B0B1 = exp_so3({0.1, 0.1, 0.1});
+  images.covariance = covariance_of_images();
+  images.matches = 100;
+  images.fitting = 80;
+  const double before = gyro_score(score);
+  score.add(motion, images, P, 10 * 1'000'000'000LL);
+  CHECK(gyro_score(score) == before);
+  images.fitting = 100;
+  score.add(motion, images, P, 10 * 1'000'000'000LL);
+  CHECK(gyro_score(score) < before);
+  CHECK(gyro_score(score) > 0.5);
+}
+
+TEST_CASE("imu score: switched off, the noise is the stated one") {
+  ImuScore score(false);
+  CHECK(score.noise().gyro == 1.0);
+  CHECK(score.noise().accel == 1.0);
+}
