@@ -1,14 +1,11 @@
 #include "calibration/batch.h"
 
 #include <ceres/normal_prior.h>
-#include <ceres/ordered_groups.h>
-#include <ceres/solver.h>
 
 #include <algorithm>
 #include <cmath>
 
 #include "calibration/grounded.h"
-#include "calibration/noise_estimate.h"
 #include "smoother/imu_factor.h"
 
 namespace ear::calibration {
@@ -19,10 +16,7 @@ constexpr double kRollHuber = 4.0;
 constexpr double kBeamHuber = 3.0;
 constexpr double kGyroBias = 0.1;   // [rad/s] where nothing is stated
 constexpr double kAccelBias = 0.5;  // [m/s^2]
-constexpr double kWildPixel = 8.0;  // [sigma] of both coordinates: the feature is used no more
-constexpr double kConverged = 1e-8;
-constexpr double kRegion =
-    1e14;  // nearly Gauss-Newton: damping would hold the scale, which is shown weakly, where it is
+constexpr double kStill = 0.03;  // [m/s] a slower body shows nothing of the cameras' clock: it is the estimate's noise
 
 Pose to_pose(const Eigen::Isometry3d& T) { return {T.linear(), T.translation()}; }
 
@@ -36,17 +30,27 @@ GivenCameras given_cameras(const Calibration& given) {
   return cameras;
 }
 
-class ProgressCallback final : public ceres::IterationCallback {
- public:
-  explicit ProgressCallback(const Batch::Progress& progress) : progress_(progress) {}
-  ceres::CallbackReturnType operator()(const ceres::IterationSummary& summary) override {
-    if (progress_) progress_(summary.iteration, summary.cost);
-    return ceres::SOLVER_CONTINUE;
-  }
+/// Norm of a factor's residual at the present values.
+template <typename Factor>
+double residual_norm(const Factor& factor, const std::vector<double*>& blocks) {
+  Eigen::VectorXd residual(factor.num_residuals());
+  factor.Evaluate(blocks.data(), residual.data(), nullptr);
+  return residual.norm();
+}
 
- private:
-  const Batch::Progress& progress_;
-};
+/// Gated: beyond it a reading belongs to something else than the model.
+bool fits(double norm, double gate) { return std::isfinite(norm) && (gate <= 0.0 || norm <= gate); }
+
+Onwards onwards(const Keyframe& keyframe, const PathNode& node) {
+  const NavState state = state_of(keyframe);
+  Onwards result;
+  result.after = seconds_between(keyframe.t_ns, node.t_ns);
+  const Eigen::Vector3d coasted = state.v_W * result.after + 0.5 * result.after * result.after * kGravity_W;
+  result.pushed = node.p_kt - state.q_WB.conjugate() * coasted;
+  result.pushed_by_bias = node.J_p_ba;
+  result.b_a = state.b_a;
+  return result;
+}
 
 }  // namespace
 
@@ -86,15 +90,15 @@ void Batch::build(double gate) {
   problem_ = std::make_unique<ceres::Problem>(options);
   terms_.clear();
   for (Segment& segment : segments_) {
-    renew_paths(segment);
+    renew_paths(segment, given_.imu.gyro_noise);
     if (!given_.cameras.empty()) place_points(segment, cameras_now());
   }
   add_blocks();
   add_priors();
   for (std::size_t i = 0; i < segments_.size(); ++i) {
     add_inertial(i);
-    if (given_.encoder) add_rolls(i);
-    if (given_.encoder) add_ground(i);
+    if (given_.encoder) add_rolls(i, gate);
+    if (given_.encoder) add_ground(i, gate);
     if (given_.encoder && given_.lasers) add_beams(i, gate);
     if (!given_.cameras.empty()) add_points(i);
     if (!segments_[i].drive->reference.empty()) add_reference(i);
@@ -147,7 +151,7 @@ void Batch::add_inertial(std::size_t s) {
   }
 }
 
-void Batch::add_rolls(std::size_t s) {
+void Batch::add_rolls(std::size_t s, double gate) {
   Segment& segment = segments_[s];
   const Calibration now = applied(given_, parameters_);
   const RollSetting setting{*given_.encoder, given_.imu, odometer_of(*given_.encoder), odometer_of(*now.encoder),
@@ -162,21 +166,27 @@ void Batch::add_rolls(std::size_t s) {
     const Eigen::Vector3d n_k = state.q_WB.conjugate() * n_W.normalized();
     const auto roll = roll_along(a.path, state.b_g, n_k, angles, setting);
     if (!roll) continue;
-    add_term({Term::roll, nullptr, s, i, 0, a.t_ns}, new RollFactor(*roll), new ceres::HuberLoss(kRollHuber),
-             {a.pose.data(), b.pose.data(), a.motion.data(), parameters_.wheels.data(), parameters_.axle.data(),
-              parameters_.encoder_time.data()});
+    auto cost = std::make_unique<RollFactor>(*roll);
+    const std::vector<double*> blocks{a.pose.data(),           b.pose.data(),
+                                      a.motion.data(),         parameters_.wheels.data(),
+                                      parameters_.axle.data(), parameters_.encoder_time.data()};
+    if (!fits(residual_norm(*cost, blocks), gate)) continue;
+    add_term({Term::roll, nullptr, s, i, 0, a.t_ns}, cost.release(), new ceres::HuberLoss(kRollHuber), blocks);
   }
 }
 
-void Batch::add_ground(std::size_t s) {
+void Batch::add_ground(std::size_t s, double gate) {
   std::deque<Keyframe>& keyframes = segments_[s].keyframes;
   const OdometerState given = odometer_of(*given_.encoder);
   for (std::size_t i = 0; i < keyframes.size(); ++i) {
     Keyframe& a = keyframes[i];
     if (a.on_ground) {
-      add_term({Term::stand, nullptr, s, i, 0, a.t_ns}, new StandFactor(StandModel{given, a.centre, noise_.stand}),
-               new ceres::HuberLoss(kBeamHuber),
-               {a.pose.data(), a.ground.data(), parameters_.wheels.data(), parameters_.axle.data()});
+      auto cost = std::make_unique<StandFactor>(StandModel{given, a.centre, noise_.stand});
+      const std::vector<double*> blocks{a.pose.data(), a.ground.data(), parameters_.wheels.data(),
+                                        parameters_.axle.data()};
+      if (fits(residual_norm(*cost, blocks), gate)) {
+        add_term({Term::stand, nullptr, s, i, 0, a.t_ns}, cost.release(), new ceres::HuberLoss(kBeamHuber), blocks);
+      }
     }
     if (i + 1 == keyframes.size()) continue;
     Keyframe& b = keyframes[i + 1];
@@ -200,15 +210,16 @@ void Batch::add_beams(std::size_t s, double gate) {
       const double range = sample.range[k];
       if (!(range >= lasers.range_min && range <= lasers.range_max)) continue;
       const LaserBeam& beam = lasers.beams[k];
-      auto cost =
-          std::make_unique<BeamFactor>(BeamModel{beam.p_BL, beam.d_B, tangent_basis(-beam.d_B), keyframe.centre,
-                                                 node.R_kt, node.p_kt, node.v_kt, node.rate_B, range, noise_.beam});
-      const std::vector<double*> blocks{keyframe.pose.data(), keyframe.ground.data(), parameters_.beams[k].data(),
-                                        parameters_.laser_time.data()};
-      double residual = 0.0;
-      cost->Evaluate(blocks.data(), &residual, nullptr);
-      if (!std::isfinite(residual) || (gate > 0.0 && std::abs(residual) > gate)) continue;
-      add_term({Term::beam, nullptr, s, i, k, sample.t_ns}, cost.release(), new ceres::HuberLoss(kBeamHuber), blocks);
+      auto cost = std::make_unique<BeamFactor>(BeamModel{beam.p_BL, beam.d_B, tangent_basis(-beam.d_B), keyframe.centre,
+                                                         onwards(keyframe, node), node.R_kt, node.v_kt, node.rate_B,
+                                                         range, noise_.beam});
+      const std::vector<double*> blocks{keyframe.pose.data(), keyframe.motion.data(), keyframe.ground.data(),
+                                        parameters_.beams[k].data(), parameters_.laser_time.data()};
+      if (!fits(residual_norm(*cost, blocks), gate)) continue;
+      const Pose T_Wk = smoother::to_pose(keyframe.pose.data());
+      const Eigen::Vector3d hit = T_Wk.p + T_Wk.R * (node.p_kt + node.R_kt * (beam.p_BL + range * beam.d_B));
+      add_term({Term::beam, nullptr, s, i, k, sample.t_ns, hit.head<2>()}, cost.release(),
+               new ceres::HuberLoss(kBeamHuber), blocks);
     }
   }
 }
@@ -221,14 +232,16 @@ void Batch::add_points(std::size_t s) {
     for (const Seen& seen : point.seen) {
       Keyframe& keyframe = segment.keyframes[seen.keyframe];
       const Eigen::Vector3d v_W = Eigen::Map<const Eigen::Vector3d>(keyframe.motion.data());
-      const Eigen::Vector3d v_B = smoother::to_pose(keyframe.pose.data()).R.transpose() * v_W;
+      const double still = std::max(0.0, 1.0 - kStill * kStill / std::max(1e-300, v_W.squaredNorm()));
+      const Eigen::Vector3d v_B = still * (smoother::to_pose(keyframe.pose.data()).R.transpose() * v_W);
       PixelObservation observation{seen.left_px, noise_.pixel, keyframe.late, keyframe.rate_B, v_B};
-      const TermBlock term{Term::pixel, nullptr, s, p, 0, keyframe.t_ns};
+      TermBlock term{Term::pixel, nullptr, s, p, 0, keyframe.t_ns, seen.left_px};
       add_term(term, new LeftPixel(observation, cameras_, point.anchor), new ceres::HuberLoss(kPixelHuber),
                {keyframe.pose.data(), parameters_.camera.data(), parameters_.lens[0].data(),
                 parameters_.camera_time.data(), point.block.data()});
       if (!seen.has_right) continue;
-      observation.px = seen.right_px;
+      observation.px = term.at = seen.right_px;
+      term.beam = 1;
       add_term(term, new RightPixel(observation, cameras_, point.anchor), new ceres::HuberLoss(kPixelHuber),
                {keyframe.pose.data(), parameters_.camera.data(), parameters_.stereo.data(), parameters_.lens[1].data(),
                 parameters_.camera_time.data(), point.block.data()});
@@ -243,101 +256,11 @@ void Batch::add_reference(std::size_t s) {
     while (i + 2 < segment.keyframes.size() && segment.keyframes[i + 1].t_ns <= position.t_ns) ++i;
     Keyframe& keyframe = segment.keyframes[i];
     if (position.t_ns < keyframe.t_ns || keyframe.path.empty() || position.t_ns > keyframe.path.back().t_ns) continue;
-    const ReferenceModel model{position.p, at(keyframe.path, position.t_ns).p_kt, segment.drive->reference_sigma};
+    const ReferenceModel model{position.p, onwards(keyframe, at(keyframe.path, position.t_ns)),
+                               segment.drive->reference_sigma};
     add_term({Term::reference, nullptr, s, i, 0, position.t_ns}, new ReferenceFactor(model), new ceres::HuberLoss(3.0),
-             {keyframe.pose.data(), segment.reference.data()});
+             {keyframe.pose.data(), keyframe.motion.data(), segment.reference.data()});
   }
-}
-
-void Batch::learn_noise() {
-  learn_from_pixels();
-  learn_from_beams();
-  if (!given_.encoder) return;
-  const RollSetting setting{*given_.encoder, given_.imu, odometer_of(*given_.encoder),
-                            odometer_of(*applied(given_, parameters_).encoder), noise_.roll};
-  double slip = 0.0;
-  for (Segment& segment : segments_) {
-    renew_paths(segment);
-    slip = std::max(slip, slip_of(segment, setting).value_or(0.0));
-  }
-  if (slip > 0.0) noise_.roll = {slip, 2.0 * slip};
-}
-
-void Batch::learn_from_pixels() {
-  std::vector<double> residuals;
-  std::array<double, 2> residual{};
-  double used = 0.0;  // rows that place the points
-  const TermBlock* before = nullptr;
-  for (const TermBlock& term : terms_) {
-    if (term.kind != Term::pixel) continue;
-    const bool same = before != nullptr && before->keyframe == term.keyframe && before->segment == term.segment;
-    if (!same) used += 3.0;
-    before = &term;
-    problem_->EvaluateResidualBlock(term.id, false, nullptr, residual.data(), nullptr);
-    if (std::hypot(residual[0], residual[1]) > kWildPixel) {
-      segments_[term.segment].points[term.keyframe].seen.clear();
-    }
-    residuals.insert(residuals.end(), residual.begin(), residual.end());
-  }
-  if (residuals.empty()) return;
-  const auto rows = static_cast<double>(residuals.size());
-  noise_.pixel *= robust_sigma(residuals) * std::sqrt(rows / std::max(1.0, rows - used));
-}
-
-void Batch::learn_from_beams() {
-  std::vector<double> residuals;
-  for (const TermBlock& term : terms_) {
-    if (term.kind != Term::beam) continue;
-    double residual = 0.0;
-    problem_->EvaluateResidualBlock(term.id, false, nullptr, &residual, nullptr);
-    residuals.push_back(residual);
-  }
-  if (!residuals.empty()) noise_.beam = std::max(0.5 * given_.lasers->noise, noise_.beam * robust_sigma(residuals));
-}
-
-bool Batch::solve(int iterations, int threads, const Progress& progress) {
-  ceres::Solver::Options options;
-  auto order = std::make_shared<ceres::ParameterBlockOrdering>();
-  bool points = false;
-  for (double* block : elimination_order()) order->AddElementToGroup(block, 1);
-  for (Segment& segment : segments_) {
-    for (Point& point : segment.points) {
-      if (point.used) order->AddElementToGroup(point.block.data(), 0);
-      points = points || point.used;
-    }
-  }
-  options.linear_solver_type = points ? ceres::SPARSE_SCHUR : ceres::SPARSE_NORMAL_CHOLESKY;
-  if (points) options.linear_solver_ordering = order;
-  options.max_num_iterations = iterations;
-  options.function_tolerance = kConverged;
-  options.initial_trust_region_radius = kRegion;
-  options.max_trust_region_radius = 1e6 * kRegion;
-  options.num_threads = threads;
-  options.logging_type = ceres::SILENT;
-  ProgressCallback callback(progress);
-  options.callbacks.push_back(&callback);
-  ceres::Solver::Summary summary;
-  ceres::Solve(options, problem_.get(), &summary);
-  return summary.IsSolutionUsable() && std::isfinite(summary.final_cost);
-}
-
-std::vector<double*> Batch::elimination_order() {
-  std::vector<double*> order;
-  for (Segment& segment : segments_) {
-    for (Point& point : segment.points) {
-      if (point.used) order.push_back(point.block.data());
-    }
-  }
-  for (Segment& segment : segments_) {
-    for (Keyframe& keyframe : segment.keyframes) {
-      order.push_back(keyframe.pose.data());
-      order.push_back(keyframe.motion.data());
-      if (given_.encoder) order.push_back(keyframe.ground.data());
-    }
-    if (!segment.drive->reference.empty()) order.push_back(segment.reference.data());
-  }
-  for (const ParameterBlock& block : blocks_) order.push_back(block.data);
-  return order;
 }
 
 }  // namespace ear::calibration

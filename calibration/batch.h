@@ -33,8 +33,9 @@ struct TermBlock {
   ceres::ResidualBlockId id = nullptr;
   std::size_t segment = 0;
   std::size_t keyframe = 0;  ///< of features: the point
-  std::size_t beam = 0;
+  std::size_t beam = 0;      ///< of features: the camera
   TimeNs t_ns = 0;
+  Eigen::Vector2d at = Eigen::Vector2d::Zero();  ///< of features: in the image [px]; of beams: the hit in the world [m]
 };
 
 class Batch {
@@ -47,7 +48,8 @@ class Batch {
   Batch(const Batch&) = delete;  // blocks do not move
   Batch& operator=(const Batch&) = delete;
 
-  /// Terms around the present values; `gate`: beams further off than this many sigmas are left out (0: none).
+  /// Terms around the present values; `gate`: what of wheels and beams is further off than this many
+  /// sigmas is left out (0: none): wheels that spin as they lift off, a beam that meets a passer-by.
   void build(double gate);
   /// Moves everything to the minimum. False if that comes to nothing. `progress` is told the iteration and the cost.
   using Progress = std::function<void(int, double)>;
@@ -63,6 +65,7 @@ class Batch {
   [[nodiscard]] const std::vector<Segment>& segments() const { return segments_; }
   [[nodiscard]] const std::vector<TermBlock>& terms() const { return terms_; }
   [[nodiscard]] ceres::Problem& problem() { return *problem_; }
+  [[nodiscard]] const ceres::Problem& problem() const { return *problem_; }
   /// Blocks in the order of elimination: points, then frames in the order of time, then parameters.
   [[nodiscard]] std::vector<double*> elimination_order();
 
@@ -70,8 +73,8 @@ class Batch {
   void add_blocks();
   void add_priors();
   void add_inertial(std::size_t segment);
-  void add_rolls(std::size_t segment);
-  void add_ground(std::size_t segment);
+  void add_rolls(std::size_t segment, double gate);
+  void add_ground(std::size_t segment, double gate);
   void add_beams(std::size_t segment, double gate);
   void add_points(std::size_t segment);
   void add_reference(std::size_t segment);
@@ -79,6 +82,7 @@ class Batch {
                                   const std::vector<double*>& blocks);
   void learn_from_pixels();
   void learn_from_beams();
+  void learn_from_ground();
   [[nodiscard]] CameraState cameras_now() const;
 
   Calibration given_;

@@ -11,11 +11,12 @@
 namespace ear::calibration {
 namespace {
 
-constexpr double kGate = 6.0;  // [sigma] of beams, once there is a solution
+constexpr double kGate = 6.0;  // [sigma] of wheels and beams, once there is a solution
 constexpr int kFirst = 12;     // iterations
 constexpr int kNext = 6;
 constexpr int kRounds = 3;
 constexpr double kLeftOut = 4.0;  // [s] of a drive: standing before the start
+constexpr double kLate = 5e-3;    // [s] of the cameras' clock: further, the body does not turn at an even rate
 
 std::vector<Entry> all_entries(const std::vector<ParameterBlock>& blocks) {
   std::vector<Entry> entries;
@@ -25,9 +26,12 @@ std::vector<Entry> all_entries(const std::vector<ParameterBlock>& blocks) {
   return entries;
 }
 
-void minimise(Batch& batch, const Settings& settings) {
+/// Returns the residuals before the first step.
+std::vector<Residual> minimise(Batch& batch, const Settings& settings) {
+  std::vector<Residual> before;
   for (int round = 0; round < kRounds; ++round) {
     batch.build(round == 0 ? 0.0 : kGate);
+    if (round == 0) before = residuals_of(batch);
     const auto told = [&](int iteration, double cost) {
       if (!settings.progress) return;
       settings.progress("round " + std::to_string(round + 1) + " of " + std::to_string(kRounds) + ", step " +
@@ -40,34 +44,40 @@ void minimise(Batch& batch, const Settings& settings) {
     }
     if (round + 1 < kRounds) batch.learn_noise();
   }
+  return before;
 }
 
 /// All drives, with the calibration at hand.
 struct Passed {
   std::unique_ptr<Batch> batch;
   double left_out = 0.0;  ///< [s]
+  std::vector<Residual> before;
 };
 
 Passed pass(const Calibration& given, const Priors& priors, const Parameters& start, const Calibration& now,
             const std::vector<Drive>& drives, const Settings& settings) {
-  Passed passed{std::make_unique<Batch>(given, priors, start, settings.noise), 0.0};
+  Passed passed{std::make_unique<Batch>(given, priors, start, settings.noise), 0.0, {}};
   for (const Drive& drive : drives) {
     if (settings.progress) settings.progress(drive.name + ": first guess of the motion");
     const FirstGuess guess = guess_motion(drive, given, now, settings.filter, settings.interval);
     passed.batch->add(drive, guess);
     passed.left_out += guess.left_out;
   }
-  minimise(*passed.batch, settings);
+  passed.before = minimise(*passed.batch, settings);
   return passed;
 }
 
-/// Over again where the calibration given was so wrong that the filter lost its way: with the one that was found.
+/// Over again where the calibration given was so wrong that the filter lost its way, or that keyframes are not where
+/// the images were taken: with the one that was found.
 Passed pass_until_whole(const Calibration& given, const Priors& priors, const std::vector<Drive>& drives,
                         const Settings& settings) {
   Passed first = pass(given, priors, zero_parameters(given), with_priors(given, priors), drives, settings);
-  if (first.left_out < kLeftOut * static_cast<double>(drives.size())) return first;
   const Parameters found = first.batch->parameters();
-  return pass(given, priors, found, applied(given, found), drives, settings);
+  const bool whole = first.left_out < kLeftOut * static_cast<double>(drives.size());
+  if (whole && std::abs(found.camera_time[0]) < kLate) return first;
+  Passed second = pass(given, priors, found, applied(given, found), drives, settings);
+  second.before = std::move(first.before);
+  return second;
 }
 
 Eigen::MatrixXd prior_covariance(const std::vector<Entry>& entries, const std::vector<int>& which) {
@@ -152,6 +162,8 @@ Result calibrate(const Calibration& given, const Priors& priors, const std::vect
     result.findings.push_back(finding);
   }
   find_entangled(entries, *P, result.findings);
+  result.before = passed.before;
+  result.after = residuals_of(batch);
   result.parameters = batch.parameters();
   result.noise = batch.noise();
   result.encoder_time = batch.parameters().encoder_time[0];

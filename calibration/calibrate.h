@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "calibration/batch.h"
+#include "calibration/residuals.h"
 
 namespace ear::calibration {
 
@@ -24,22 +25,13 @@ struct Finding {
   std::string motion_wanted;   ///< what would show it; empty where it was shown
 };
 
-/// Residuals over the noise, per sensor.
-struct SensorFit {
-  std::string sensor;
-  std::size_t count = 0;
-  double sigma = 0.0;  ///< the noise found, in `unit`
-  std::string unit;
-  double outliers = 0.0;  ///< share beyond 4 sigma
-};
-
 struct Result {
   Calibration calibration;  ///< with the standard deviations stated
   Parameters parameters;
   std::vector<Finding> findings;  ///< in the order of blocks_of()
   Eigen::MatrixXd covariance;     ///< in the units of Parameters
   Noise noise;
-  std::vector<SensorFit> fits;
+  std::vector<Residual> before, after;          ///< by the calibration given, and by that found
   double encoder_time = 0.0, laser_time = 0.0;  ///< [s] to add to the stamps
   double left_out = 0.0;                        ///< [s] of the drives, where there was no estimate in one piece
 };

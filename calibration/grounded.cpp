@@ -7,9 +7,9 @@
 namespace ear::calibration {
 namespace {
 
-constexpr double kLonger = 0.06;         // [m] than on the ground
-constexpr double kOnGround = 0.3;        // share of the drive
-constexpr TimeNs kMargin = 500'000'000;  // [ns] around what is off the ground
+constexpr double kLonger = 0.06;           // [m] than on the ground
+constexpr double kOnGround = 0.3;          // share of the drive
+constexpr TimeNs kMargin = 1'000'000'000;  // [ns] around what is off the ground: a take-off begins gently
 
 /// Of all beams. Nothing where half of them or more have no return.
 std::optional<double> mean_range(const LaserSample& sample, const LaserCalibration& lasers) {

@@ -7,7 +7,7 @@
 namespace ear::calibration {
 
 /// Marks each keyframe. Off the ground is where the mean of all beams is 6 cm longer than where the vehicle stands, or
-/// most beams have no return, and half a second around it. A vehicle without beams is always on the ground. For 30 % of
+/// most beams have no return, and a second around it. A vehicle without beams is always on the ground. For 30 % of
 /// the drive, at least, it must be on the ground.
 void mark_ground(Segment& segment, const LaserCalibration& lasers);
 

@@ -52,6 +52,8 @@ std::vector<PathNode> path_along(const std::vector<InertialPiece>& pieces, const
     const double dt = piece.dt;
     const Eigen::Vector3d f_B = piece.accel_B - from.b_a;
     const Eigen::Vector3d phi = node.rate_B * dt;
+    node.J_p_ba += node.J_v_ba * dt - node.R_kt * gamma<2>(phi) * dt * dt;
+    node.J_v_ba -= node.R_kt * gamma<1>(phi) * dt;
     node.p_kt += node.v_kt * dt + node.R_kt * gamma<2>(phi) * f_B * dt * dt + 0.5 * gravity_k * dt * dt;
     node.v_kt += node.R_kt * gamma<1>(phi) * f_B * dt + gravity_k * dt;
     node.R_kt = renormalized(node.R_kt * exp_so3(phi));
@@ -68,6 +70,7 @@ PathNode at(const std::vector<PathNode>& path, TimeNs t_ns) {
   const double dt = seconds_between(node.t_ns, t_ns);
   node.t_ns = t_ns;
   node.p_kt += node.v_kt * dt;
+  node.J_p_ba += node.J_v_ba * dt;
   node.R_kt = node.R_kt * exp_so3(node.rate_B * dt);
   return node;
 }

@@ -31,6 +31,8 @@ struct PathNode {
   Eigen::Vector3d p_kt = Eigen::Vector3d::Zero();    ///< [m]
   Eigen::Vector3d v_kt = Eigen::Vector3d::Zero();    ///< in the world's frame of rest, axes of the keyframe [m/s]
   Eigen::Vector3d rate_B = Eigen::Vector3d::Zero();  ///< [rad/s], of what follows
+  Eigen::Matrix3d J_v_ba = Eigen::Matrix3d::Zero();  ///< derivatives of v_kt and p_kt by the accelerometer's bias
+  Eigen::Matrix3d J_p_ba = Eigen::Matrix3d::Zero();
 };
 
 /// Nodes at the ends of all pieces, from a state at the keyframe.

@@ -82,31 +82,50 @@ struct GroundCentre {
   double x = 0.0, y = 0.0;  ///< [m]
 };
 
-/// A beam meets the plane. Blocks: pose of the keyframe, ground, beam, time. Residual: measured less predicted.
+/// Where the body is a little after a keyframe. Only what the accelerometer adds is taken as it was integrated:
+/// velocity, gravity and bias move with the keyframe, or readings would seem to show how the body lies in the world.
+struct Onwards {
+  double after = 0.0;                                        ///< [s]
+  Eigen::Vector3d pushed = Eigen::Vector3d::Zero();          ///< by the specific force, in the keyframe [m]
+  Eigen::Matrix3d pushed_by_bias = Eigen::Matrix3d::Zero();  ///< its derivative by the bias
+  Eigen::Vector3d b_a = Eigen::Vector3d::Zero();             ///< that it was integrated with [m/s^2]
+
+  /// Blocks: pose of the keyframe, its motion. In the world.
+  template <typename T>
+  [[nodiscard]] Vector3<T> position(const BlockValues<T>& pose, const BlockValues<T>& motion) const {
+    const Vector3<T> more = motion.vector3(smoother::motion_entry::b_a) - b_a.cast<T>();
+    const Vector3<T> force = pushed.cast<T>() + pushed_by_bias.cast<T>() * more;
+    const Vector3<T> fallen = (0.5 * after * after * kGravity_W).cast<T>();
+    return pose.p() + motion.vector3(smoother::motion_entry::v) * T(after) + fallen + pose.R() * force;
+  }
+};
+
+/// A beam meets the plane. Blocks: pose of the keyframe, its motion, ground, beam, time. Residual: measured less
+/// predicted.
 struct BeamModel {
   Eigen::Vector3d p_BL, d_B;         ///< the beam as it was given
   Eigen::Matrix<double, 3, 2> tilt;  ///< axes that the direction turns about
   GroundCentre centre;
-  Eigen::Matrix3d R_kt = Eigen::Matrix3d::Identity();  ///< the body at the reading's time, in that at the keyframe
-  Eigen::Vector3d p_kt = Eigen::Vector3d::Zero();
-  Eigen::Vector3d v_kt = Eigen::Vector3d::Zero();    ///< its velocity, there [m/s]
-  Eigen::Vector3d rate_B = Eigen::Vector3d::Zero();  ///< [rad/s]
-  double range = 0.0, sigma = 1.0;                   ///< [m]
+  Onwards onwards;                                     ///< to the reading's time
+  Eigen::Matrix3d R_kt = Eigen::Matrix3d::Identity();  ///< the body there, in that at the keyframe
+  Eigen::Vector3d v_kt = Eigen::Vector3d::Zero();      ///< its velocity, there [m/s]
+  Eigen::Vector3d rate_B = Eigen::Vector3d::Zero();    ///< [rad/s]
+  double range = 0.0, sigma = 1.0;                     ///< [m]
 
   template <typename T>
-  void operator()(const std::array<BlockValues<T>, 4>& blocks, T* residual) const {
-    const T& late = blocks[3].v[0];
-    const Vector3<T> tilted = tilt.cast<T>() * Eigen::Matrix<T, 2, 1>(blocks[2].v[3], blocks[2].v[4]);
+  void operator()(const std::array<BlockValues<T>, 5>& blocks, T* residual) const {
+    const T& late = blocks[4].v[0];
+    const Vector3<T> tilted = tilt.cast<T>() * Eigen::Matrix<T, 2, 1>(blocks[3].v[3], blocks[3].v[4]);
     const Vector3<T> d = d_B.cast<T>();
     const Vector3<T> direction = (d + tilted.cross(d)).normalized();  // as in applied()
     const Vector3<T> turn = rate_B.cast<T>() * late;
     const auto to_keyframe = [&](const Vector3<T>& v) -> Vector3<T> { return R_kt.cast<T>() * (v + turn.cross(v)); };
-    const Vector3<T> p_k = p_kt.cast<T>() + v_kt.cast<T>() * late + to_keyframe(p_BL.cast<T>() + blocks[2].vector3(0));
+    const Vector3<T> lever_k = v_kt.cast<T>() * late + to_keyframe(p_BL.cast<T>() + blocks[3].vector3(0));
     const Matrix3<T> R_Wk = blocks[0].R();
-    const Vector3<T> p_W = blocks[0].p() + R_Wk * p_k;
+    const Vector3<T> p_W = onwards.position(blocks[0], blocks[1]) + R_Wk * lever_k;
     const Vector3<T> d_W = R_Wk * to_keyframe(direction);
-    const Vector3<T> n = upwards(blocks[1]);
-    const Vector3<T> from_centre = p_W - Vector3<T>(T(centre.x), T(centre.y), blocks[1].v[0]);
+    const Vector3<T> n = upwards(blocks[2]);
+    const Vector3<T> from_centre = p_W - Vector3<T>(T(centre.x), T(centre.y), blocks[2].v[0]);
     residual[0] = (range + n.dot(from_centre) / n.dot(d_W)) / sigma;
   }
 };
@@ -179,31 +198,31 @@ struct BiasModel {
   }
 };
 
-/// A position that something else measured, in a world of its own. Blocks: pose, the other world's (4): its origin in
-/// ours [m], and its heading [rad].
+/// A position that something else measured, in a world of its own. Blocks: pose, motion, the other world's (4): its
+/// origin in ours [m], and its heading [rad].
 struct ReferenceModel {
-  Eigen::Vector3d p = Eigen::Vector3d::Zero();     ///< measured [m]
-  Eigen::Vector3d p_kt = Eigen::Vector3d::Zero();  ///< the body at its time, in that at the keyframe
-  double sigma = 1.0;                              ///< [m]
+  Eigen::Vector3d p = Eigen::Vector3d::Zero();  ///< measured [m]
+  Onwards onwards;                              ///< to its time
+  double sigma = 1.0;                           ///< [m]
 
   template <typename T>
-  void operator()(const std::array<BlockValues<T>, 2>& blocks, T* residual) const {
+  void operator()(const std::array<BlockValues<T>, 3>& blocks, T* residual) const {
     using std::cos;
     using std::sin;
-    const T c = cos(blocks[1].v[3]);
-    const T s = sin(blocks[1].v[3]);
+    const T c = cos(blocks[2].v[3]);
+    const T s = sin(blocks[2].v[3]);
     const Vector3<T> there(c * p.x() - s * p.y(), s * p.x() + c * p.y(), T(p.z()));
-    const Vector3<T> error = there + blocks[1].vector3(0) - blocks[0].p() - blocks[0].R() * p_kt.cast<T>();
+    const Vector3<T> error = there + blocks[2].vector3(0) - onwards.position(blocks[0], blocks[1]);
     for (int k = 0; k < 3; ++k) residual[k] = error(k) / sigma;
   }
 };
 
 using RollFactor = JetFactor<RollModel, 3, 7, 7, 9, 3, 5, 1>;
-using BeamFactor = JetFactor<BeamModel, 1, 7, 3, 5, 1>;
+using BeamFactor = JetFactor<BeamModel, 1, 7, 9, 3, 5, 1>;
 using StandFactor = JetFactor<StandModel, 2, 7, 3, 3, 5>;
 using GroundFactor = JetFactor<GroundModel, 3, 3, 3>;
 using OriginFactor = JetFactor<OriginModel, 4, 7>;
 using BiasFactor = JetFactor<BiasModel, 6, 9>;
-using ReferenceFactor = JetFactor<ReferenceModel, 3, 7, 4>;
+using ReferenceFactor = JetFactor<ReferenceModel, 3, 7, 9, 4>;
 
 }  // namespace ear::calibration

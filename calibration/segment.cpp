@@ -76,6 +76,29 @@ void choose_points(std::vector<Point>& all, const PointChoice& choice, Segment& 
   }
 }
 
+/// The mean rate around a time, from the paths before and after; none where it is no more than the gyroscope's noise:
+/// that would seem to show a clock where nothing moves.
+Eigen::Vector3d rate_at(const std::vector<PathNode>& before, const std::vector<PathNode>& after, TimeNs t_ns,
+                        double gyro_noise) {
+  constexpr TimeNs kHalf = 25'000'000;   // [ns]
+  constexpr double kSignificant = 25.0;  // times the variance of an axis: five standard deviations
+  Eigen::Vector3d turned = Eigen::Vector3d::Zero();
+  double duration = 0.0;
+  for (const auto* path : {&before, &after}) {
+    for (std::size_t i = 0; i + 1 < path->size(); ++i) {
+      const PathNode& node = (*path)[i];
+      if (node.t_ns < t_ns - kHalf || node.t_ns >= t_ns + kHalf) continue;
+      const double dt = seconds_between(node.t_ns, (*path)[i + 1].t_ns);
+      turned += dt * node.rate_B;
+      duration += dt;
+    }
+  }
+  if (duration <= 0.0) return Eigen::Vector3d::Zero();
+  const Eigen::Vector3d rate = turned / duration;
+  const double noise = kSignificant * gyro_noise * gyro_noise / duration;
+  return rate * std::max(0.0, 1.0 - noise / std::max(1e-300, rate.squaredNorm()));
+}
+
 }  // namespace
 
 Segment make_segment(const Drive& drive, const FirstGuess& guess, const Calibration& given, const PointChoice& choice) {
@@ -103,14 +126,15 @@ NavState state_of(const Keyframe& keyframe) {
   return state;
 }
 
-void renew_paths(Segment& segment) {
+void renew_paths(Segment& segment, double gyro_noise) {
   for (Keyframe& keyframe : segment.keyframes) {
-    if (keyframe.since.empty()) continue;
-    keyframe.path = path_along(keyframe.since, state_of(keyframe));
-    keyframe.rate_B = keyframe.path.front().rate_B;
+    if (!keyframe.since.empty()) keyframe.path = path_along(keyframe.since, state_of(keyframe));
   }
-  const std::size_t n = segment.keyframes.size();
-  if (n > 1) segment.keyframes[n - 1].rate_B = segment.keyframes[n - 2].path.back().rate_B;
+  for (std::size_t i = 0; i < segment.keyframes.size(); ++i) {
+    Keyframe& keyframe = segment.keyframes[i];
+    keyframe.rate_B = rate_at(i > 0 ? segment.keyframes[i - 1].path : std::vector<PathNode>{}, keyframe.path,
+                              keyframe.t_ns, gyro_noise);
+  }
 }
 
 void place_points(Segment& segment, const CameraState& cameras) {

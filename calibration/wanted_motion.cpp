@@ -48,16 +48,18 @@ std::string motion_that_shows(const std::string& entry) {
 }
 
 std::string recommended_drive() {
-  return "On a flat hard floor, in a room with texture 1 to 6 m away, in good light; about two and a half minutes.\n"
+  return "On a flat hard floor, in a room with texture 1 to 6 m away, in good light; less than three minutes.\n"
          " 1. Stand for 3 s.                                              biases, tilt\n"
          " 2. Swing the body about the axle by 10 degrees for 10 s.       axle's direction and height, beams, laser "
          "clock\n"
          " 3. Turn on the spot, two turns to the left, two to the right.  wheel separation, axle's position, lens\n"
          " 4. Drive a figure of eight with bends of 1 m radius, twice.    cameras in the body, time offsets, wheels\n"
          " 5. Drive 4 m straight on, brake hard, and back the same way.   wheel radii, axle's direction\n"
-         " 6. Take off, hover at 0.5 to 1 m for 20 s and move 0.5 m to each side, land on the same place; do it "
-         "twice.\n"
-         "                                                                beams: origins and directions; scale\n"
+         " 6. Take off to 0.6 m and move 0.9 m left and right, a second each way, six times; land, swing as in 2 for 6 "
+         "s.\n"
+         "    Then at 2 m: left and right eight times, forwards and backwards six times, turn left by 90 degrees, "
+         "left\n"
+         "    and right seven times; turn back and land.                  beams: origins and directions; scale\n"
          " 7. Stand for 3 s.\n"
          "What cannot fly: for step 6 drive over a ramp or a step of a few centimetres, along it and at an angle. "
          "Without\n"

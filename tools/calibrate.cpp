@@ -19,6 +19,7 @@
 #include "src/recording/input_error.h"
 #include "src/recording/recording.h"
 #include "tools/calibration/recorded_drive.h"
+#include "tools/calibration/report.h"
 #include "tools/calibration/result_text.h"
 #include "tools/commands.h"
 #include "tools/input_options.h"
@@ -38,6 +39,7 @@ struct CalibrateArguments {
   std::vector<fs::path> reference;
   double reference_sigma = 1.0;
   fs::path imu;
+  fs::path report;
   bool plan = false;
   int threads = 2;
 };
@@ -107,6 +109,7 @@ void calibrate_drives(const CalibrateArguments& args) {
   const std::string text = calibration::to_text(result);
   write_text(args.out / "calibration.txt", text);
   write_text(args.out / "calibration.json", calibration::to_json(result));
+  if (!args.report.empty()) write_text(args.report, calibration::to_html(args.recordings.front().string(), result));
   const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
   std::printf("%s%.1f s: %s\n", text.c_str(), taken.count(), args.out.c_str());
 }
@@ -155,6 +158,7 @@ void add_calibrate_command(CLI::App& app) {
   command->add_option("--reference-sigma", args->reference_sigma, "Of one such position, one axis [m]")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
+  command->add_option("--report", args->report, "HTML page: residuals before and after, hits of beams");
   command->add_option("--imu", args->imu, "A recording at rest: the noise of the IMU, and nothing else");
   command->add_flag("--plan", args->plan, "Print the drive to make");
   command->add_option("--threads", args->threads, "For the batch estimate")

@@ -1,5 +1,8 @@
 // Simulated vehicles with a calibration five times as wrong as those of real rigs, on feature tracks.
 #include <cmath>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "tests/smoother/support.h"
 #include "tools/calibration/simulated_drive.h"
@@ -41,23 +44,96 @@ TEST_CASE("calibrate: the recommended drive shows everything, and errors are as 
     squares += std::pow(made.errors[i] / found.posterior, 2) / static_cast<double>(made.errors.size());
   }
   MESSAGE("mean squared normalized error: " << squares);
-  CHECK(squares < 3.0);
-  CHECK(finding(made, "encoder0: wheel radius, mean").posterior < 0.002 * 75.0);
+  CHECK(squares < 2.0);  // of 48, correlated: 0.5 to 1.6 over ten vehicles
+  CHECK(finding(made, "encoder0: wheel radius, mean").posterior < 0.0012 * 75.0);
   CHECK(made.result.calibration.encoder->wheel_radius_sigma.has_value());
 }
 
-TEST_CASE("calibrate: what standing cannot show keeps its value, and says which motion would show it") {
-  const SimulatedCalibration made = calibrated("static", 12, 10.0, 20.0);
-  for (const Finding& found : made.result.findings) {
-    const auto is = [&](const char* part) { return found.name.find(part) != std::string::npos; };
-    const bool by_motion = is("wheel") || is("axle x") || is("axle y") || is("axle turned") || is("origin y");
-    if (!by_motion) continue;  // how high the axle is over the beams' origins shows at rest
-    CAPTURE(found.name);
-    CHECK_FALSE(found.shown);
-    CHECK(found.change == 0.0);
-    CHECK_FALSE(found.motion_wanted.empty());
-    CHECK(found.posterior == doctest::Approx(found.prior));
+namespace {
+
+/// A drive and what it cannot show: parts of names, with a part of the motion that would show it.
+struct Poor {
+  std::string sequence;
+  std::optional<double> duration;
+  std::vector<std::pair<std::string, std::string>> refused;
+  std::vector<std::string> shown;
+};
+
+void check_poor(const Poor& poor) {
+  double squares = 0.0, count = 0.0;
+  for (unsigned seed = 31; seed <= 33; ++seed) {
+    CAPTURE(seed);
+    const SimulatedCalibration made = calibrated(poor.sequence, seed, 15.0, poor.duration);
+    for (std::size_t i = 0; i < made.errors.size(); ++i) {
+      const Finding& found = made.result.findings[i];
+      CAPTURE(found.name);
+      const auto is = [&](const std::string& part) { return found.name.find(part) != std::string::npos; };
+      for (const auto& [part, motion] : poor.refused) {
+        if (!is(part)) continue;
+        CHECK_FALSE(found.shown);
+        CHECK(found.motion_wanted.find(motion) != std::string::npos);
+      }
+      for (const std::string& part : poor.shown) {
+        if (is(part)) CHECK(found.shown);
+      }
+      if (!found.shown) {
+        CHECK(found.change == 0.0);
+        CHECK_FALSE(found.motion_wanted.empty());
+        CHECK(found.posterior == doctest::Approx(found.prior));
+      } else {
+        CHECK(std::abs(made.errors[i]) < 5.0 * found.posterior);
+        squares += std::pow(made.errors[i] / found.posterior, 2);
+        count += 1.0;
+      }
+    }
   }
+  MESSAGE(poor.sequence << ": mean squared normalized error of what is shown: " << squares / count);
+  CHECK(squares / count < 2.0);  // over three vehicles; 1 where standard deviations are right
+}
+
+}  // namespace
+
+TEST_CASE("calibrate: standing shows no wheel, no direction and no clock; each refusal names a motion") {
+  check_poor({"static",
+              20.0,
+              {{"wheel radius", "drive"},
+               {"wheel separation", "turn on the spot"},
+               {"position of the axle x", "turn on the spot"},
+               {"axle turned about x", "turn on the spot"},
+               {"axle turned about z", "straight on"},
+               {"cam0: rotation", "figures of eight"},
+               {"cam0: position", "turn on the spot"},
+               {"cam0: time", "figures of eight"},
+               {"encoder0: time", "figures of eight"},
+               {"tilt", "hover"},
+               {"origin y", "hover"}},
+              {"cam1: rotation in cam0 about z"}});
+}
+
+TEST_CASE("calibrate: a straight drive shows the difference of the radii, and not how far the wheels are apart") {
+  check_poor({"straight",
+              std::nullopt,
+              {{"wheel separation", "turn on the spot"},
+               {"position of the axle y", "turn on the spot"},
+               {"cam0: position in the body y", "turn on the spot"},
+               {"tilt", "hover"},
+               {"origin y", "hover"},
+               {"laser0: time", "swing"}},
+              {"wheel radius, left less right", "axle turned about z", "cam0: time"}});
+}
+
+TEST_CASE("calibrate: one circle shows the axle, and neither the radii's difference nor the beams' directions") {
+  check_poor({"circle",
+              std::nullopt,
+              {{"wheel radius, left less right", "turn, both ways"}, {"tilt", "hover"}, {"origin y", "hover"}},
+              {"position of the axle x", "axle turned about x", "cam0: time"}});
+}
+
+TEST_CASE("calibrate: on a flat floor wheels show, and the beams' directions do not") {
+  check_poor({"flat1",
+              35.0,
+              {{"tilt", "hover"}, {"origin y", "hover"}},
+              {"wheel radius", "wheel separation", "position of the axle x", "axle turned", "cam0: rotation"}});
 }
 
 TEST_CASE("calibrate: no estimate is an error in words") {

@@ -1,3 +1,4 @@
+#include "calibration/inertial_path.h"
 #include "calibration/models.h"
 #include "calibration/pixel_factor.h"
 #include "smoother/feature_factor.h"
@@ -102,19 +103,50 @@ TEST_CASE("calibration: derivatives of a beam, the ground's change, the origin a
     beam.tilt = tangent_basis(-beam.d_B);
     beam.centre = {0.1, 0.2};
     beam.R_kt = exp_so3(random_vector(rng, 0.05));
-    beam.p_kt = random_vector(rng, 0.1);
+    beam.onwards = {0.1, random_vector(rng, 0.1), -0.005 * random_pose(rng, 0.5, 1.0).R, random_vector(rng, 0.1)};
     beam.v_kt = random_vector(rng, 0.5);
     beam.rate_B = random_vector(rng, 0.5);
     beam.range = 0.4;
     beam.sigma = 0.004;
-    smoother::test::check_factor(BeamFactor(beam),
-                                 {block(T_WB), small(rng, 3, 0.1), small(rng, 5, 0.02), small(rng, 1, 0.002)});
+    smoother::test::check_factor(BeamFactor(beam), {block(T_WB), small(rng, 9, 0.3), small(rng, 3, 0.1),
+                                                    small(rng, 5, 0.02), small(rng, 1, 0.002)});
     smoother::test::check_factor(GroundFactor(GroundModel{{0.1, 0.2}, {0.4, -0.1}, 0.001, 0.01}),
                                  {small(rng, 3, 0.1), small(rng, 3, 0.1)});
     smoother::test::check_factor(OriginFactor(OriginModel{T_WB}), {block(T_WB)});
     smoother::test::check_factor(BiasFactor(BiasModel{}), {small(rng, 9, 0.1)});
-    smoother::test::check_factor(ReferenceFactor(ReferenceModel{random_vector(rng, 1.0), random_vector(rng, 0.1), 0.5}),
-                                 {block(T_WB), small(rng, 4, 0.3)});
+    smoother::test::check_factor(ReferenceFactor(ReferenceModel{random_vector(rng, 1.0), beam.onwards, 0.5}),
+                                 {block(T_WB), small(rng, 9, 0.3), small(rng, 4, 0.3)});
+  }
+}
+
+TEST_CASE("calibration: where the body goes after a keyframe turns with it, whatever is frozen") {
+  std::mt19937_64 rng{8};
+  for (int trial = 0; trial < 5; ++trial) {
+    NavState state;
+    state.q_WB = Eigen::Quaterniond(exp_so3(random_vector(rng, 0.3)));
+    state.p_WB = random_vector(rng, 1.0);
+    state.v_W = random_vector(rng, 1.0);
+    state.b_a = random_vector(rng, 0.1);
+    std::vector<InertialPiece> pieces;
+    for (int i = 0; i < 40; ++i) {
+      pieces.push_back({5'000'000LL * i, 0.005, random_vector(rng, 0.5), random_vector(rng, 3.0)});
+    }
+    const auto world = [&](const NavState& from) -> Eigen::Vector3d {
+      return from.p_WB + from.q_WB * path_along(pieces, from).back().p_kt;
+    };
+    NavState other = state;  // another attitude, velocity and bias than what was frozen
+    other.q_WB = Eigen::Quaterniond(exp_so3(random_vector(rng, 0.05)) * state.q_WB.toRotationMatrix());
+    other.v_W += random_vector(rng, 0.2);
+    other.b_a += random_vector(rng, 0.1);
+    const PathNode node = path_along(pieces, state).back();
+    Onwards onwards{0.2, Eigen::Vector3d::Zero(), node.J_p_ba, state.b_a};
+    onwards.pushed = node.p_kt - state.q_WB.conjugate() * (0.2 * state.v_W + 0.5 * 0.04 * kGravity_W);
+    BlockValues<double> pose, motion;
+    Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(pose.v.data()) = other.q_WB.toRotationMatrix();
+    Eigen::Map<Eigen::Vector3d>(pose.v.data() + 9) = other.p_WB;
+    Eigen::Map<Eigen::Vector3d>(motion.v.data() + smoother::motion_entry::v) = other.v_W;
+    Eigen::Map<Eigen::Vector3d>(motion.v.data() + smoother::motion_entry::b_a) = other.b_a;
+    CHECK((onwards.position(pose, motion) - world(other)).norm() < 1e-9);
   }
 }
 
@@ -138,7 +170,8 @@ TEST_CASE("calibration: a beam meets a tilted plane where a line meets it, by ot
     }
     beam.range = low;
     const Eigen::VectorXd r = smoother::test::residual(
-        BeamFactor(beam), {block(T_WB), ground, Eigen::VectorXd::Zero(5), Eigen::VectorXd::Zero(1)});
+        BeamFactor(beam),
+        {block(T_WB), Eigen::VectorXd::Zero(9), ground, Eigen::VectorXd::Zero(5), Eigen::VectorXd::Zero(1)});
     CHECK(std::abs(r(0)) < 1e-9);
   }
 }
