@@ -1,0 +1,24 @@
+// A moment as the page reads it: JSON, and the image as JPEG. docs/view.md has the fields.
+#pragma once
+
+#include <string>
+
+#include "frontend/lens.h"
+#include "src/view/moment.h"
+
+namespace ear::view {
+
+/// The fields of a JSON object, without its braces: History adds the number.
+[[nodiscard]] std::string summary_text(const Moment& moment);
+
+/// A list of [id, age, x, y], x and y [px] in the left image, and behind them those in the right one where it was seen
+/// there. A feature without a pixel is left out.
+[[nodiscard]] std::string features_text(const Moment& moment, const Lens* left, const Lens* right);
+
+/// The image with at most `most_width` columns; empty where there is none or it cannot be encoded.
+[[nodiscard]] std::string jpeg(const ImageView& image, int most_width);
+
+/// What stays the same.
+[[nodiscard]] std::string description_text(const Description& description);
+
+}  // namespace ear::view
