@@ -69,6 +69,7 @@ class Odometry::Impl {
 
   [[nodiscard]] const Estimator& estimator() const { return *estimator_; }
   [[nodiscard]] const StageTimes& stage_times() const { return stage_times_; }
+  [[nodiscard]] FeatureFrame features() const { return features_ == nullptr ? FeatureFrame{} : *features_; }
 
   [[nodiscard]] InputCounts input_counts() const {
     InputCounts counts = estimator_->input_counts();
@@ -132,7 +133,7 @@ class Odometry::Impl {
       return std::nullopt;
     }
     const double start = clock_();
-    const FeatureFrame* const features = track(frame);
+    const FeatureFrame* const features = features_ = track(frame);
     if (features == nullptr) {
       ++camera_.implausible;
       return std::nullopt;
@@ -232,8 +233,9 @@ class Odometry::Impl {
   std::unique_ptr<Estimator> estimator_;
   std::optional<Frontend> frontend_;  ///< with a camera
   LoadGovernor load_;
-  int frames_left_out_ = 0;       ///< in a row
-  int frames_without_right_ = 0;  ///< frames used in a row whose right image was not
+  int frames_left_out_ = 0;                 ///< in a row
+  int frames_without_right_ = 0;            ///< frames used in a row whose right image was not
+  const FeatureFrame* features_ = nullptr;  ///< the front end's, of the last image
   StageTimes stage_times_;
   StreamCounts camera_;
   StreamCounts steps_;
@@ -262,6 +264,7 @@ Status Odometry::status() const { return impl_->estimator().status(); }
 Health Odometry::health() const { return impl_->health(); }
 InputCounts Odometry::input_counts() const { return impl_->input_counts(); }
 StageTimes Odometry::stage_times() const { return impl_->stage_times(); }
+FeatureFrame Odometry::features() const { return impl_->features(); }
 Calibration Odometry::calibration() const { return impl_->calibration(); }
 void Odometry::reset() { *impl_ = impl_->fresh(); }
 

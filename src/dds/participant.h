@@ -22,6 +22,7 @@ struct Publication {
   std::string type;   ///< "sensor_msgs/msg/Imu"
   bool reliable = false;
   bool transient_local = false;  ///< late readers get what was written before
+  std::string user_data;         ///< what the writer says of itself
 };
 
 /// The domain that ROS_DOMAIN_ID names, or 0. Throws std::invalid_argument if it is no number from 0 to 232.
@@ -53,7 +54,8 @@ class Writer {
   struct Options {
     bool reliable = true;
     bool transient_local = false;
-    int depth = 10;  ///< samples that are kept for readers that are slow
+    int depth = 10;         ///< samples that are kept for readers that are slow
+    std::string user_data;  ///< what others are told of the writer
   };
   /// Throws std::runtime_error.
   Writer(const Participant& participant, const std::string& topic, const std::string& type, const Options& options);
@@ -101,7 +103,7 @@ class Subscription {
 
   void run();
   void adapt();
-  void read(Reader& reader);
+  bool read(Reader& reader);
 
   const Participant& participant_;
   std::function<void(const Received&)> take_;

@@ -19,6 +19,9 @@ Intake::Intake(LiveEstimator& estimator, const Calibration& calibration, const L
   if (calibration.lasers) laser_ = std::make_unique<StreamWatch>("beams", calibration.lasers->rate_hz, begin);
   if (calibration.cameras.empty()) return;
   cameras_ = std::make_unique<StreamWatch>("cameras", calibration.cameras.front().rate_hz, begin);
+  if (calibration.cameras.size() == 2) {
+    swap_ = std::make_unique<SwapWatch>(calibration.cameras[0], calibration.cameras[1]);
+  }
 }
 
 bool Intake::add(const ImuSample& sample) {
@@ -62,6 +65,7 @@ bool Intake::add(const StereoFrame& frame) {
     wrong_height_ = fits(frame.left, 0) ? frame.right.height : frame.left.height;
     return false;
   }
+  if (swap_) swap_->take(frame);
   const bool taken = estimator_.add_stereo(frame);
   if (taken && taps_.stereo) taps_.stereo(frame);
   return taken;
@@ -86,6 +90,7 @@ std::vector<std::string> Intake::look() {
   for (StreamWatch* stream : streams()) {
     for (std::string& text : stream->look(now)) words.push_back(std::move(text));
   }
+  if (std::string text = swap_ ? swap_->look() : ""; !text.empty()) words.push_back(std::move(text));
   if (wrong_width_ > 0 && (said_size_ns_ == 0 || seconds_between(said_size_ns_, now) > kRepeat)) {
     const CameraCalibration& wanted = calibration_.cameras.front();
     words.push_back("cameras: images of " + std::to_string(wrong_width_) + "x" + std::to_string(wrong_height_) +

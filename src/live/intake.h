@@ -11,6 +11,7 @@
 #include "src/live/live_clock.h"
 #include "src/live/live_estimator.h"
 #include "src/live/stream_watch.h"
+#include "src/live/swap_watch.h"
 
 namespace ear::live {
 
@@ -55,6 +56,7 @@ class Intake {
   IntakeTaps taps_;
   std::unique_ptr<StreamWatch> imu_, encoder_, laser_, cameras_;  ///< null: there is no such sensor
   std::atomic<int> wrong_width_{0}, wrong_height_{0};             ///< of an image that was refused
+  std::unique_ptr<SwapWatch> swap_;                               ///< null: there are no two cameras
   TimeNs said_size_ns_ = 0;
 };
 

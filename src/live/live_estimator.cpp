@@ -14,11 +14,12 @@ namespace {
 using SteadyClock = std::chrono::steady_clock;
 
 constexpr TimeNs kNever = std::numeric_limits<TimeNs>::min();
-constexpr std::chrono::milliseconds kPatience{100};   // with readings that belong before a frame and are not there
-constexpr std::chrono::milliseconds kNoSamples{500};  // a frame waits for inertial samples, at most
-constexpr TimeNs kLongestHeld = 300'000'000;          // samples are handed over without a frame after this time
-constexpr TimeNs kDead = 500'000'000;                 // without a reading: the sensor is not waited for
-constexpr long kWakeNs = 5'000'000;                   // the thread looks again, whatever was missed
+constexpr std::chrono::milliseconds kPatience{100};    // with readings that belong before a frame and are not there
+constexpr std::chrono::milliseconds kNoSamples{500};   // a frame waits for inertial samples, at most
+constexpr std::chrono::milliseconds kLongestLook{10};  // that counts as waiting
+constexpr TimeNs kLongestHeld = 300'000'000;           // samples are handed over without a frame after this time
+constexpr TimeNs kDead = 500'000'000;                  // without a reading: the sensor is not waited for
+constexpr long kWakeNs = 5'000'000;                    // the thread looks again, whatever was missed
 
 TimeNs period(double rate_hz) { return std::llround(1e9 / rate_hz); }
 
@@ -86,6 +87,7 @@ bool LiveEstimator::add_stereo(const StereoFrame& frame) {
 
 void LiveEstimator::run() {
   while (true) {
+    count_waiting();
     while (advance()) continue;
     if (stop_) return;
     timespec until{};
@@ -98,11 +100,18 @@ void LiveEstimator::run() {
   }
 }
 
+/// A stall of this process is no waiting: what came meanwhile is still on its way.
+void LiveEstimator::count_waiting() {
+  const SteadyClock::time_point now = SteadyClock::now();
+  if (waited_) *waited_ += std::min<std::chrono::nanoseconds>(now - looked_, kLongestLook);
+  looked_ = now;
+}
+
 /// One frame or one inertial sample; false: nothing can be done before more comes.
 bool LiveEstimator::advance() {
   const std::optional<TimeNs> frame_ns = queued_.next_frame_ns();
   if (!frame_ns) {
-    waits_.reset();
+    waited_.reset();
   } else if (reached_ns_ >= *frame_ns) {
     return take_frame(*frame_ns);
   }
@@ -112,16 +121,16 @@ bool LiveEstimator::advance() {
   }
   if (!frame_ns) return false;
   // No inertial samples: the frame goes on without, once all slots are taken.
-  if (!waits_) waits_ = SteadyClock::now();
-  if (SteadyClock::now() - *waits_ < kNoSamples) return false;
+  if (!waited_) waited_.emplace(0);
+  if (*waited_ < kNoSamples) return false;
   return take_frame(*frame_ns);
 }
 
 /// False: it stays, and waits for other sensors.
 bool LiveEstimator::take_frame(TimeNs frame_ns) {
   if (!stop_ && (is_owed(encoder_) || is_owed(laser_))) {
-    if (!waits_) waits_ = SteadyClock::now();
-    if (SteadyClock::now() - *waits_ < kPatience) return false;
+    if (!waited_) waited_.emplace(0);
+    if (*waited_ < kPatience) return false;
     ++impatient_;
   }
   std::optional<Estimate> estimate;
@@ -129,7 +138,7 @@ bool LiveEstimator::take_frame(TimeNs frame_ns) {
     reached_ns_ = kNever;  // the stamp that reached it was a false one
     return false;
   }
-  waits_.reset();
+  waited_.reset();
   handed_over_ns_ = frame_ns;
   steps_.saw_frame(frame_ns);
   report(std::move(estimate), frame_ns);

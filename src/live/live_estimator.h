@@ -74,6 +74,7 @@ class LiveEstimator {
   };
 
   void run();
+  void count_waiting();
   [[nodiscard]] bool advance();
   [[nodiscard]] bool take_frame(TimeNs frame_ns);
   void take_sample();
@@ -86,9 +87,10 @@ class LiveEstimator {
   Beside encoder_, laser_;
   LiveListeners listeners_;
   BlindSteps steps_;
-  TimeNs reached_ns_;                                           ///< the newest inertial stamp taken
-  TimeNs handed_over_ns_ = 0;                                   ///< up to here samples were given to the estimator
-  std::optional<std::chrono::steady_clock::time_point> waits_;  ///< since when a frame waits for other sensors
+  TimeNs reached_ns_;                               ///< the newest inertial stamp taken
+  TimeNs handed_over_ns_ = 0;                       ///< up to here samples were given to the estimator
+  std::optional<std::chrono::nanoseconds> waited_;  ///< so long a frame has waited for other sensors
+  std::chrono::steady_clock::time_point looked_;    ///< when the thread last looked for samples
   std::atomic<std::uint64_t> impatient_{0};
   sem_t news_{};
   std::atomic<bool> stop_ = false;

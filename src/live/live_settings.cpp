@@ -72,8 +72,8 @@ CameraSettings load_cameras(const YamlMap& map, const fs::path& file) {
 }
 
 RosSettings load_ros(const YamlMap& map) {
-  map.require_only(
-      {"domain", "publish", "odometry", "predicted", "path", "diagnostics", "odom_frame", "base_frame", "tf"});
+  map.require_only({"domain", "publish", "odometry", "predicted", "path", "features", "diagnostics", "odom_frame",
+                    "base_frame", "tf", "tf_static"});
   RosSettings settings;
   if (map.has("domain")) {
     settings.domain = map.get<int>("domain");
@@ -84,10 +84,12 @@ RosSettings load_ros(const YamlMap& map) {
   names.odometry = map.get_or("odometry", names.odometry);
   names.predicted = map.get_or("predicted", names.predicted);
   names.path = map.get_or("path", names.path);
+  names.features = map.get_or("features", names.features);
   names.diagnostics = map.get_or("diagnostics", names.diagnostics);
   names.odom_frame = map.get_or("odom_frame", names.odom_frame);
   names.base_frame = map.get_or("base_frame", names.base_frame);
   names.tf = map.get_or("tf", names.tf);
+  names.tf_static = map.get_or("tf_static", names.tf_static);
   if (names.odometry.empty() || names.diagnostics.empty()) throw map.error("odometry", "a topic's name expected");
   return settings;
 }

@@ -27,7 +27,8 @@ ImageView copy(const ImageView& from, cv::Mat& to) {
 
 }  // namespace
 
-Recorder::Recorder(const fs::path& file, const Calibration& calibration, const fs::path& calibration_folder) {
+Recorder::Recorder(const fs::path& file, const Calibration& calibration, const fs::path& calibration_folder)
+    : beams_(calibration.lasers ? calibration.lasers->beams.size() : 0) {
   if (fs::exists(file)) throw InputError(located(file, 0, "", "is there already"));
   writer_ = std::make_unique<rosbag2::RecordingWriter>(file, ros2::default_topics(), calibration, calibration_folder);
   thread_ = std::thread([this] { run(); });
@@ -44,8 +45,8 @@ void Recorder::close() {
   if (thread_.joinable()) thread_.join();
 }
 
-void Recorder::add(const QueuedOdometry::Ranges& ranges, std::size_t beams) {
-  const auto end = ranges.range.begin() + static_cast<std::ptrdiff_t>(std::min(beams, ranges.range.size()));
+void Recorder::add(const QueuedOdometry::Ranges& ranges) {
+  const auto end = ranges.range.begin() + static_cast<std::ptrdiff_t>(std::min(beams_, ranges.range.size()));
   push({LaserSample{ranges.t_ns, {ranges.range.begin(), end}}, sizeof(ranges)});
 }
 
@@ -103,9 +104,14 @@ void Recorder::run() {
   }
 }
 
-std::string Recorder::failure() {
+std::vector<std::string> Recorder::look() {
+  std::vector<std::string> words;
   const std::lock_guard lock(mutex_);
-  return failure_;
+  if (!failure_.empty() && !std::exchange(said_failure_, true)) words.push_back(failure_ + ": no more is recorded");
+  if (failure_.empty() && left_out_ > 0 && !std::exchange(said_left_out_, true)) {
+    words.emplace_back("--record: the disk is too slow: messages are left out");
+  }
+  return words;
 }
 
 }  // namespace ear::live

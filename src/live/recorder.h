@@ -39,7 +39,7 @@ class Recorder {
   /// Any thread. Images are copied.
   void add(const ImuSample& sample) { push({sample, sizeof(sample)}); }
   void add(const EncoderSample& sample) { push({sample, sizeof(sample)}); }
-  void add(const QueuedOdometry::Ranges& ranges, std::size_t beams);
+  void add(const QueuedOdometry::Ranges& ranges);
   void add(const StereoFrame& frame);
   /// A message that went out.
   void add(const std::string& topic, const std::string& type, TimeNs t_ns, std::vector<std::uint8_t> cdr);
@@ -47,9 +47,10 @@ class Recorder {
   /// Writes what waits, and completes the file.
   void close();
 
+  /// Messages that the disk was too slow for, or that came after it failed.
   [[nodiscard]] std::uint64_t left_out() const { return left_out_; }
-  /// Words about a disk that takes no more, once; else empty.
-  [[nodiscard]] std::string failure();
+  /// By one thread: words about a disk that is too slow or takes no more, each once.
+  [[nodiscard]] std::vector<std::string> look();
 
  private:
   struct Message {
@@ -67,7 +68,9 @@ class Recorder {
   void run();
 
   std::unique_ptr<rosbag2::RecordingWriter> writer_;  ///< the thread's
-  std::mutex mutex_;                                  ///< of what follows, up to the counter
+  std::size_t beams_ = 0;                             ///< of the calibration
+  bool said_failure_ = false, said_left_out_ = false;
+  std::mutex mutex_;  ///< of what follows, up to the counter
   std::condition_variable changed_;
   std::deque<Item> items_;
   std::size_t bytes_ = 0;  ///< of these

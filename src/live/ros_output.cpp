@@ -70,6 +70,12 @@ ros2::Odometry RosMessages::odometry(const NavState& state, const Eigen::Vector3
   return message;
 }
 
+ros2::TfMessage RosMessages::frames(const Calibration& calibration, TimeNs t_ns) const {
+  Calibration mounted = calibration;
+  mounted.encoder.emplace().T_BO = T_B_base_;
+  return ros2::static_frames(mounted, names_.base_frame, t_ns);
+}
+
 ros2::TfMessage RosMessages::transform(const ros2::Odometry& odometry) const {
   const ros2::Pose& pose = odometry.pose.pose;
   ros2::TransformStamped transform;

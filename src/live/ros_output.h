@@ -7,7 +7,7 @@
 
 #include "src/live/live_estimator.h"
 #include "src/live/ros_names.h"
-#include "src/ros2/messages.h"
+#include "src/ros2/calibration_messages.h"
 
 namespace ear::live {
 
@@ -20,6 +20,8 @@ class RosMessages {
   /// the twist about the axes of base_frame; without an estimate, as for predicted states, they are 0: not known.
   [[nodiscard]] ros2::Odometry odometry(const NavState& state, const Eigen::Vector3d& rate_B,
                                         const Estimate* estimate) const;
+  /// base_frame to the IMU, and the IMU to cameras and beams, as `ear export` names them.
+  [[nodiscard]] ros2::TfMessage frames(const Calibration& calibration, TimeNs t_ns) const;
   [[nodiscard]] ros2::TfMessage transform(const ros2::Odometry& odometry) const;
   /// Level, words, and the numbers behind them. `rates`: of the sensors, in words.
   [[nodiscard]] ros2::DiagnosticArray diagnostics(TimeNs t_ns, const Health& health, const std::string& rates) const;

@@ -1,21 +1,54 @@
 #include "src/live/ros_publisher.h"
 
+#include <utility>
+
 #include "src/ros2/cdr.h"
+#include "src/ros2/type_hash.h"
 
 namespace ear::live {
+namespace {
+
+/// Newer distributions look in the writer's user data for the hash of its type.
+template <typename Message>
+dds::Writer writer_of(const dds::Participant& participant, const std::string& topic, int depth = 10,
+                      bool transient_local = false) {
+  const std::string hash = ros2::type_hash_of(Message::kType);
+  return {participant, topic, Message::kType, {true, transient_local, depth, "typehash=" + hash + ";"}};
+}
+
+}  // namespace
 
 RosPublisher::RosPublisher(const dds::Participant& participant, RosMessages messages, OnMessage on_message)
     : messages_(std::move(messages)),
       on_message_(std::move(on_message)),
       path_(messages_.names().odom_frame),
-      odometry_(participant, messages_.names().odometry, ros2::Odometry::kType, {}),
-      diagnostics_(participant, messages_.names().diagnostics, ros2::DiagnosticArray::kType, {}) {
+      odometry_(writer_of<ros2::Odometry>(participant, messages_.names().odometry)),
+      diagnostics_(writer_of<ros2::DiagnosticArray>(participant, messages_.names().diagnostics)) {
   const RosNames& names = messages_.names();
-  if (!names.predicted.empty())
-    predicted_.emplace(participant, names.predicted, ros2::Odometry::kType, dds::Writer::Options{});
-  if (names.tf) tf_.emplace(participant, "/tf", ros2::TfMessage::kType, dds::Writer::Options{true, false, 100});
-  if (!names.path.empty())
-    path_writer_.emplace(participant, names.path, ros2::Path::kType, dds::Writer::Options{true, false, 1});
+  if (!names.predicted.empty()) predicted_ = writer_of<ros2::Odometry>(participant, names.predicted);
+  if (names.tf) tf_ = writer_of<ros2::TfMessage>(participant, "/tf", 100);
+  if (!names.path.empty()) path_writer_ = writer_of<ros2::Path>(participant, names.path, 1);
+}
+
+void RosPublisher::publish_frames(const dds::Participant& participant, const ros2::TfMessage& frames) {
+  frames_ = writer_of<ros2::TfMessage>(participant, "/tf_static", 1, true);
+  frames_->write(ros2::encode(frames));
+}
+
+void RosPublisher::publish_features(const dds::Participant& participant, const CameraCalibration& left) {
+  features_ = writer_of<ros2::Image>(participant, messages_.names().features, 2);
+  feature_images_ = std::make_unique<FeatureImages>(left);
+}
+
+void RosPublisher::take(const StereoFrame& frame) {
+  if (!feature_images_) return;
+  feature_images_->want(features_->is_read());
+  feature_images_->take(frame);
+}
+
+void RosPublisher::show(const Odometry& odometry) {
+  if (!feature_images_ || !feature_images_->wanted()) return;
+  if (const auto image = feature_images_->draw(odometry.features())) features_->write(ros2::encode(*image));
 }
 
 template <typename Message>
@@ -27,7 +60,8 @@ void RosPublisher::write(dds::Writer& writer, const std::string& topic, TimeNs t
 
 void RosPublisher::take(const ImuSample& sample, const std::optional<NavState>& state) {
   if (!predicted_ || !state) return;
-  predicted_->write(ros2::encode(messages_.odometry(*state, sample.gyro_B - state->b_g, nullptr)));
+  write(*predicted_, messages_.names().predicted, state->t_ns,
+        messages_.odometry(*state, sample.gyro_B - state->b_g, nullptr));
 }
 
 void RosPublisher::take(const LiveFrame& frame) {
@@ -41,7 +75,7 @@ void RosPublisher::take(const LiveFrame& frame) {
   write(odometry_, messages_.names().odometry, state.t_ns, message);
   if (tf_) write(*tf_, "/tf", state.t_ns, messages_.transform(message));
   const ros2::Path* const path = path_writer_ && path_writer_->is_read() ? path_.add(message) : nullptr;
-  if (path != nullptr) path_writer_->write(ros2::encode(*path));
+  if (path != nullptr) write(*path_writer_, messages_.names().path, state.t_ns, *path);
 }
 
 void RosPublisher::tell(TimeNs t_ns, const std::string& rates) {
@@ -50,7 +84,7 @@ void RosPublisher::tell(TimeNs t_ns, const std::string& rates) {
     const std::lock_guard lock(mutex_);
     health = health_;
   }
-  diagnostics_.write(ros2::encode(messages_.diagnostics(t_ns, health, rates)));
+  write(diagnostics_, messages_.names().diagnostics, t_ns, messages_.diagnostics(t_ns, health, rates));
 }
 
 }  // namespace ear::live

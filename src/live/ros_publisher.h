@@ -3,12 +3,14 @@
 
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "src/dds/participant.h"
+#include "src/live/feature_images.h"
 #include "src/live/ros_output.h"
 
 namespace ear::live {
@@ -16,10 +18,19 @@ namespace ear::live {
 class RosPublisher {
  public:
   /// `participant` must outlive it. Throws std::runtime_error.
-  /// `on_message` is told of what the estimator's thread sends, if it is there: topic, type, stamp, CDR.
+  /// `on_message` is told of all that is sent, if it is there: topic, type, stamp, CDR; by the threads that send.
   using OnMessage =
       std::function<void(const std::string&, const std::string&, TimeNs, const std::vector<std::uint8_t>&)>;
   RosPublisher(const dds::Participant& participant, RosMessages messages, OnMessage on_message);
+
+  /// Where the sensors are, once: kept for those who join later.
+  void publish_frames(const dds::Participant& participant, const ros2::TfMessage& frames);
+
+  /// The left camera's images with their features, while somebody reads them; before the first image.
+  void publish_features(const dds::Participant& participant, const CameraCalibration& left);
+  /// By the cameras' thread; by the estimator's, after an image.
+  void take(const StereoFrame& frame);
+  void show(const Odometry& odometry);
 
   /// By the inertial sensor's thread, after each sample.
   void take(const ImuSample& sample, const std::optional<NavState>& state);
@@ -37,7 +48,8 @@ class RosPublisher {
   OnMessage on_message_;
   RosPath path_;
   dds::Writer odometry_;
-  std::optional<dds::Writer> predicted_, tf_, path_writer_;
+  std::optional<dds::Writer> predicted_, tf_, frames_, path_writer_, features_;
+  std::unique_ptr<FeatureImages> feature_images_;  ///< with these
   dds::Writer diagnostics_;
   Eigen::Vector3d gyro_B_ = Eigen::Vector3d::Zero();
   std::mutex mutex_;  ///< of the health

@@ -10,7 +10,7 @@ namespace ear::live {
 namespace {
 
 constexpr std::size_t kMostComplaints = 20;  // that wait to be said
-constexpr int kSampleDepth = 500;            // messages of a quick sensor that wait for its thread
+constexpr int kSampleDepth = 2000;           // messages of a quick sensor that wait for its thread: 10 s at 200 Hz
 constexpr int kImageDepth = 4;
 
 const char* const kImuType = ros2::Imu::kType;

@@ -3,6 +3,8 @@
 #include <cmath>
 #include <utility>
 
+#include "src/recording/input_error.h"
+
 namespace ear::live {
 namespace {
 
@@ -91,6 +93,21 @@ std::vector<std::string> StereoCamera::look() {
   const std::lock_guard lock(mutex_);
   if (!failure_.empty()) words.push_back("cameras: " + std::exchange(failure_, ""));
   return words;
+}
+
+std::unique_ptr<StereoCamera> open_cameras(const LiveSettings& settings, Intake& intake) {
+  const CameraSettings& wanted = settings.cameras.value();
+  const std::vector<CameraCalibration>& cameras = intake.calibration().cameras;
+  if (cameras.empty()) throw InputError(located(settings.file, 0, "cameras", "the calibration has none"));
+  if (!wanted.right.empty() && cameras.size() < 2) {
+    throw InputError(located(settings.file, 0, "cameras.right", "the calibration has one camera"));
+  }
+  const bool side_by_side = wanted.right.empty() && cameras.size() > 1;
+  const int width = (side_by_side ? 2 : 1) * cameras[0].width;
+  auto left = open_v4l2(wanted.device, width, cameras[0].height, wanted.rate_hz);
+  std::unique_ptr<VideoDevice> right;
+  if (!wanted.right.empty()) right = open_v4l2(wanted.right, cameras[1].width, cameras[1].height, wanted.rate_hz);
+  return std::make_unique<StereoCamera>(std::move(left), std::move(right), wanted.delay, intake);
 }
 
 }  // namespace ear::live

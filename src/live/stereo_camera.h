@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "src/live/intake.h"
+#include "src/live/live_settings.h"
 #include "src/live/video_device.h"
 
 namespace ear::live {
@@ -46,5 +47,9 @@ class StereoCamera {
   std::atomic<bool> stop_ = false;
   std::thread thread_;  ///< last: it uses all else
 };
+
+/// Opens the video devices of `settings.cameras`, which must be there. Throws InputError where the calibration does not
+/// fit them, and std::runtime_error as open_v4l2().
+[[nodiscard]] std::unique_ptr<StereoCamera> open_cameras(const LiveSettings& settings, Intake& intake);
 
 }  // namespace ear::live

@@ -14,6 +14,8 @@ constexpr double kFlood = 3.0;     // times the rate in the calibration
 constexpr double kSlow = 0.5;
 constexpr double kNormal = 0.2;        // back to normal: the rate again, within this part
 constexpr double kFewest = 10.0;       // [Hz] above this part of the calibration's rate, no fewer
+constexpr double kClockWords = 10.0;   // [s] in which a clock that is set again and again has words for
+constexpr int kMostClockWords = 3;     // so many times
 constexpr TimeNs kStep = 250'000'000;  // a clock that goes this far ahead of ours or falls behind has been set
 
 template <typename... Values>
@@ -30,9 +32,10 @@ StreamWatch::StreamWatch(std::string name, double rate_hz, TimeNs begin_ns)
 
 void StreamWatch::note(TimeNs t_ns, TimeNs now_ns) {
   const TimeNs delay = duration_ns(t_ns, now_ns);
-  if (count_ > 0 && std::abs(duration_ns(delay_ns_, delay)) > kStep &&
-      seconds_between(arrival_ns_, now_ns) < kSilence) {
-    step_ns_ = duration_ns(delay, delay_ns_);
+  const TimeNs step = duration_ns(delay, delay_ns_);
+  const bool waited = 2 * duration_ns(arrival_ns_, now_ns) > std::abs(step);  // the sample, or this process
+  if (count_ > 0 && std::abs(step) > kStep && !waited) {
+    step_ns_ = step;
     ++steps_;
   }
   delay_ns_ = delay;
@@ -44,7 +47,7 @@ std::vector<std::string> StreamWatch::look(TimeNs now_ns) {
   std::vector<std::string> words;
   look_for_silence(now_ns, words);
   look_at_rate(now_ns, words);
-  look_at_clock(words);
+  look_at_clock(now_ns, words);
   return words;
 }
 
@@ -85,11 +88,16 @@ void StreamWatch::look_at_rate(TimeNs now_ns, std::vector<std::string>& words) {
   }
 }
 
-void StreamWatch::look_at_clock(std::vector<std::string>& words) {
+void StreamWatch::look_at_clock(TimeNs now_ns, std::vector<std::string>& words) {
   const std::uint64_t steps = steps_;
   if (steps == seen_steps_) return;
+  if (seconds_between(clock_words_.since_ns, now_ns) > kClockWords) clock_words_ = {now_ns, 0};
+  if (clock_words_.count >= kMostClockWords) return;  // held back: the next time says how many there were
+  ++clock_words_.count;
   words.push_back(text("%s: its clock was set by %+.3f s against this computer's", name_.c_str(),
                        1e-9 * static_cast<double>(step_ns_.load())));
+  if (steps > seen_steps_ + 1)
+    words.back() += text(", and %.0f times before", static_cast<double>(steps - seen_steps_ - 1));
   seen_steps_ = steps;
 }
 

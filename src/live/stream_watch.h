@@ -32,7 +32,7 @@ class StreamWatch {
  private:
   void look_for_silence(TimeNs now_ns, std::vector<std::string>& words);
   void look_at_rate(TimeNs now_ns, std::vector<std::string>& words);
-  void look_at_clock(std::vector<std::string>& words);
+  void look_at_clock(TimeNs now_ns, std::vector<std::string>& words);
 
   std::string name_;
   double expected_hz_;
@@ -45,6 +45,10 @@ class StreamWatch {
   // Of the thread that looks.
   std::uint64_t seen_ = 0, seen_steps_ = 0;
   TimeNs seen_ns_;
+  struct ClockWords {
+    TimeNs since_ns = 0;
+    int count = 0;
+  } clock_words_;
   double rate_hz_ = 0.0;
   bool silent_ = false, was_low_ = false;
   enum class Rate { right, high, low } said_ = Rate::right;

@@ -107,12 +107,13 @@ GreyImage grey_image(const RawMessage& message, const std::string& camera, Warni
 }
 
 void StereoPairing::take(std::size_t camera, GreyImage image, std::vector<RecordedFrame>& frames, Warnings& warnings) {
-  if (last_ns_[camera] && image.t_ns <= *last_ns_[camera]) {
-    const char* const kind = image.t_ns == *last_ns_[camera] ? ": duplicate stamp" : ": backward stamp";
+  const StampOrder::Order order = order_[camera].take(image.t_ns);
+  if (order == StampOrder::Order::duplicate || order == StampOrder::Order::earlier) {
+    const char* const kind = order == StampOrder::Order::duplicate ? ": duplicate stamp" : ": backward stamp";
     warnings.add("cam" + std::to_string(camera) + kind, std::to_string(image.t_ns) + " ns");
     return;
   }
-  last_ns_[camera] = image.t_ns;
+  if (order == StampOrder::Order::anew) waiting_[camera].clear();
   waiting_[camera].push_back(std::move(image));
   match(frames, warnings);
 }

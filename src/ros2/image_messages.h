@@ -4,12 +4,12 @@
 #include <array>
 #include <deque>
 #include <opencv2/core/mat.hpp>
-#include <optional>
 #include <vector>
 
 #include "src/recording/frame_queue.h"
 #include "src/recording/warnings.h"
 #include "src/ros2/raw_message.h"
+#include "src/ros2/stamp_order.h"
 
 namespace ear::ros2 {
 
@@ -27,12 +27,14 @@ struct GreyImage {
 
 /// Pairs the images of two cameras whose stamps are within 3 ms, in whatever order they come. A left image whose
 /// partner does not come (a later right one did, or eight later left ones) is a frame alone; a right one without a left
-/// one is left out. Both are counted. Frames come in the order of time.
+/// one is left out. Both are counted. Frames come in the order of time, unless the
+/// clock was set back.
 class StereoPairing {
  public:
   explicit StereoPairing(bool stereo) : stereo_(stereo) {}
 
-  /// `camera` 0 is left, 1 right. Appends frames that are complete; images whose stamps do not grow are left out.
+  /// `camera` 0 is left, 1 right. Appends frames that are complete; images whose stamps do not grow are left out, until
+  /// five in a row show that the clock was set back.
   void take(std::size_t camera, GreyImage image, std::vector<RecordedFrame>& frames, Warnings& warnings);
   /// What waits, at the end.
   void finish(std::vector<RecordedFrame>& frames, Warnings& warnings);
@@ -43,7 +45,7 @@ class StereoPairing {
 
   bool stereo_;
   std::array<std::deque<GreyImage>, 2> waiting_;
-  std::array<std::optional<TimeNs>, 2> last_ns_;
+  std::array<StampOrder, 2> order_;
 };
 
 }  // namespace ear::ros2

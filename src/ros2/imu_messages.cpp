@@ -19,8 +19,11 @@ void ImuMessages::take(const RawMessage& message, std::vector<ImuSample>& sample
     samples.push_back(sample);
     return;
   }
-  std::deque<ImuSample>& queue = message.topic == topics_.accel ? accel_ : gyro_;
-  if (!queue.empty() && sample.t_ns <= queue.back().t_ns) {
+  const bool accel = message.topic == topics_.accel;
+  std::deque<ImuSample>& queue = accel ? accel_ : gyro_;
+  const StampOrder::Order order = (accel ? accel_order_ : gyro_order_).take(sample.t_ns);
+  if (order == StampOrder::Order::anew) queue.clear();
+  if (order == StampOrder::Order::duplicate || order == StampOrder::Order::earlier) {
     warnings.add("imu0: backward stamp", message.topic + ": " + std::to_string(sample.t_ns) + " ns");
     return;
   }

@@ -7,6 +7,7 @@
 
 #include "src/recording/warnings.h"
 #include "src/ros2/raw_message.h"
+#include "src/ros2/stamp_order.h"
 #include "src/ros2/topics.h"
 
 namespace ear::ros2 {
@@ -19,13 +20,15 @@ class ImuMessages {
   explicit ImuMessages(const SensorTopics& topics) : topics_(topics) {}
 
   /// Appends the samples that are complete now. Throws InputError for another type or wrong bytes. `warnings` counts
-  /// samples of the gyroscope that no two accelerations enclose within 0.1 s, and stamps that run backward.
+  /// samples of the gyroscope that no two accelerations enclose within 0.1 s, and stamps that run backward, which are
+  /// left out until five in a row show that the clock was set back.
   void take(const RawMessage& message, std::vector<ImuSample>& samples, Warnings& warnings);
 
  private:
   void pair(std::vector<ImuSample>& samples, Warnings& warnings);
 
   SensorTopics topics_;
+  StampOrder gyro_order_, accel_order_;
   std::deque<ImuSample> gyro_;   // waiting for an acceleration that is not earlier
   std::deque<ImuSample> accel_;  // the one before the oldest of gyro_, and all after it
 };

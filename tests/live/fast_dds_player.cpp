@@ -1,289 +1,206 @@
-// A vehicle with ROS 2 that shares no code with what it tests: plays a recording in real time as topics by eProsima's
-// Fast DDS, and writes down the odometry that comes back.
+// Plays a recording in real time as topics of ROS 2, by another implementation of DDS than the one that it tests, and
+// writes down the odometry that comes back.
 //
 //   fast_dds_player RECORDING DOMAIN reliable|best_effort ODOMETRY.csv [SECONDS]
 //
-// Types are written out here, byte by byte as Fast CDR lays them. Everything stays on the loopback interface.
-#include <fastcdr/Cdr.h>
-#include <fastcdr/FastBuffer.h>
-#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
-#include <fastdds/dds/domain/DomainParticipant.hpp>
-#include <fastdds/dds/domain/DomainParticipantFactory.hpp>
-#include <fastdds/dds/publisher/DataWriter.hpp>
-#include <fastdds/dds/publisher/Publisher.hpp>
-#include <fastdds/dds/subscriber/DataReader.hpp>
-#include <fastdds/dds/subscriber/DataReaderListener.hpp>
-#include <fastdds/dds/subscriber/SampleInfo.hpp>
-#include <fastdds/dds/subscriber/Subscriber.hpp>
-#include <fastdds/dds/topic/TopicDataType.hpp>
-#include <fastdds/dds/topic/TypeSupport.hpp>
-
-#include <algorithm>
+// After so many seconds it ends; a recording that is shorter goes on as that of a vehicle that stands.
+#include <array>
 #include <chrono>
-#include <cmath>
-#include <cstdio>
 #include <cstdlib>
-#include <cstring>
 #include <fstream>
 #include <iostream>
+#include <iterator>
+#include <limits>
 #include <map>
-#include <memory>
 #include <mutex>
+#include <random>
 #include <string>
 #include <thread>
+#include <utility>
+#include <variant>
 #include <vector>
 
 #include "src/recording/recording.h"
+#include "tests/live/fast_dds_vehicle.h"
 
 namespace {
 
-using namespace eprosima::fastdds::dds;
-using eprosima::fastcdr::Cdr;
-using Bytes = std::vector<std::uint8_t>;
 using SteadyClock = std::chrono::steady_clock;
 
-/// Any type: its data are bytes that are serialised already.
-class BytesType final : public TopicDataType {
+/// Writes each odometry message as a row: stamp [ns], position [m], how long after its image went out [ns],
+/// frames.
+class OdometryLog {
  public:
-  explicit BytesType(const std::string& name) {
-    setName(name.c_str());
-    m_typeSize = 1U << 20U;
-    m_isGetKeyDefined = false;
+  explicit OdometryLog(const std::string& file) : out_(file) { out_.precision(17); }
+
+  /// A left image goes out now.
+  void sends(std::int64_t t_ns) {
+    const std::lock_guard lock(mutex_);
+    sent_[t_ns] = SteadyClock::now();
   }
-  bool serialize(void* data, eprosima::fastrtps::rtps::SerializedPayload_t* payload) override {
-    const Bytes& bytes = *static_cast<const Bytes*>(data);
-    std::copy(bytes.begin(), bytes.end(), payload->data);
-    payload->length = static_cast<std::uint32_t>(bytes.size());
-    payload->encapsulation = CDR_LE;
-    return true;
-  }
-  bool deserialize(eprosima::fastrtps::rtps::SerializedPayload_t* payload, void* data) override {
-    static_cast<Bytes*>(data)->assign(payload->data, payload->data + payload->length);
-    return true;
-  }
-  std::function<std::uint32_t()> getSerializedSizeProvider(void* data) override {
-    return [data] { return static_cast<std::uint32_t>(static_cast<const Bytes*>(data)->size()); };
-  }
-  void* createData() override { return new Bytes; }
-  void deleteData(void* data) override { delete static_cast<Bytes*>(data); }
-  bool getKey(void* /*data*/, eprosima::fastrtps::rtps::InstanceHandle_t* /*handle*/, bool /*force_md5*/) override {
-    return false;
-  }
-};
-
-/// The bytes of a message, which `fill` lays.
-template <typename Fill>
-Bytes lay(std::size_t capacity, const Fill& fill) {
-  Bytes bytes(capacity);
-  eprosima::fastcdr::FastBuffer buffer(reinterpret_cast<char*>(bytes.data()), bytes.size());
-  Cdr cdr(buffer, Cdr::LITTLE_ENDIANNESS, Cdr::DDS_CDR);
-  cdr.serialize_encapsulation();
-  fill(cdr);
-  bytes.resize(cdr.getSerializedDataLength());
-  return bytes;
-}
-
-void header(Cdr& cdr, std::int64_t t_ns, const char* frame) {
-  cdr << static_cast<std::int32_t>(t_ns / 1'000'000'000) << static_cast<std::uint32_t>(t_ns % 1'000'000'000);
-  cdr << std::string(frame);
-}
-
-void nothing(Cdr& cdr, int count) {
-  for (int i = 0; i < count; ++i) cdr << 0.0;
-}
-
-Bytes imu(const ear::ImuSample& sample) {
-  return lay(512, [&](Cdr& cdr) {
-    header(cdr, sample.t_ns, "imu0");
-    nothing(cdr, 3 + 1 + 9);  // orientation: not known
-    for (int i = 0; i < 3; ++i) cdr << sample.gyro_B[i];
-    nothing(cdr, 9);
-    for (int i = 0; i < 3; ++i) cdr << sample.accel_B[i];
-    nothing(cdr, 9);
-  });
-}
-
-Bytes joints(const ear::EncoderSample& sample, double resolution) {
-  const std::vector<std::string> names{"left_wheel", "right_wheel"};
-  const std::vector<double> angles{2.0 * M_PI * static_cast<double>(sample.left_count) / resolution,
-                                   2.0 * M_PI * static_cast<double>(sample.right_count) / resolution};
-  return lay(512, [&](Cdr& cdr) {
-    header(cdr, sample.t_ns, "");
-    cdr << names << angles << std::vector<double>{} << std::vector<double>{};
-  });
-}
-
-Bytes range(std::int64_t t_ns, double metres) {
-  return lay(256, [&](Cdr& cdr) {
-    header(cdr, t_ns, "laser");
-    cdr << std::uint8_t{1} << 0.01F << 0.02F << 4.0F;
-    cdr << (std::isnan(metres) ? INFINITY : static_cast<float>(metres));
-  });
-}
-
-Bytes image(std::int64_t t_ns, const ear::ImageView& view) {
-  std::vector<std::uint8_t> pixels;
-  for (int row = 0; row < view.height; ++row) {
-    const std::uint8_t* const from = view.data + row * view.stride;
-    pixels.insert(pixels.end(), from, from + view.width);
-  }
-  return lay(pixels.size() + 256, [&](Cdr& cdr) {
-    header(cdr, t_ns, "camera");
-    cdr << static_cast<std::uint32_t>(view.height) << static_cast<std::uint32_t>(view.width) << std::string("mono8");
-    cdr << std::uint8_t{0} << static_cast<std::uint32_t>(view.width) << pixels;
-  });
-}
-
-/// Writes each odometry message as a row: stamp [ns], position [m], when it came since the start [ns].
-class OdometryLog final : public DataReaderListener {
- public:
-  OdometryLog(const std::string& file, SteadyClock::time_point start) : out_(file), start_(start) {
-    out_.precision(17);
-  }
-  void on_data_available(DataReader* reader) override {
-    Bytes bytes;
-    SampleInfo info;
-    while (reader->take_next_sample(&bytes, &info) == ReturnCode_t::RETCODE_OK) {
-      if (!info.valid_data) continue;
-      eprosima::fastcdr::FastBuffer buffer(reinterpret_cast<char*>(bytes.data()), bytes.size());
-      Cdr cdr(buffer, Cdr::DEFAULT_ENDIAN, Cdr::DDS_CDR);
-      cdr.read_encapsulation();
-      std::int32_t seconds = 0;
-      std::uint32_t nanoseconds = 0;
-      std::string frame, child;
-      double x = 0.0, y = 0.0, z = 0.0;
-      cdr >> seconds >> nanoseconds >> frame >> child >> x >> y >> z;
-      const std::lock_guard lock(mutex_);
-      out_ << std::int64_t{seconds} * 1'000'000'000 + nanoseconds << "," << x << "," << y << "," << z << ","
-           << std::chrono::nanoseconds(SteadyClock::now() - start_).count() << "," << frame << "," << child
-           << std::endl;
-    }
+  void take(const fast_dds::Odometry& message) {
+    const SteadyClock::time_point now = SteadyClock::now();
+    const std::lock_guard lock(mutex_);
+    // The state's stamp is the image's, moved by what was learned of the camera's clock.
+    auto sent = sent_.lower_bound(message.t_ns - kClock);
+    if (sent != sent_.end() && sent->first > message.t_ns + kClock) sent = sent_.end();
+    const std::chrono::nanoseconds delay = sent == sent_.end() ? std::chrono::nanoseconds(-1) : now - sent->second;
+    out_ << message.t_ns << "," << message.x << "," << message.y << "," << message.z << "," << delay.count() << ","
+         << message.frame << "," << message.child << std::endl;
+    if (sent != sent_.end()) sent_.erase(sent_.begin(), std::next(sent));
   }
 
  private:
+  static constexpr std::int64_t kClock = 15'000'000;
+
   std::mutex mutex_;
   std::ofstream out_;
-  SteadyClock::time_point start_;
+  std::map<std::int64_t, SteadyClock::time_point> sent_;
 };
 
-class Vehicle {
+/// The topics of a recording's sensors.
+class Topics {
  public:
-  Vehicle(int domain, bool reliable) : reliable_(reliable) {
-    DomainParticipantQos qos = PARTICIPANT_QOS_DEFAULT;
-    auto transport = std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>();
-    transport->interfaceWhiteList.emplace_back("127.0.0.1");
-    qos.transport().use_builtin_transports = false;
-    qos.transport().user_transports.push_back(transport);
-    for (std::uint32_t port = 0; port < 4; ++port) {  // metatraffic of the first participants
-      eprosima::fastrtps::rtps::Locator_t peer;
-      eprosima::fastrtps::rtps::IPLocator::setIPv4(peer, 127, 0, 0, 1);
-      peer.port = 7400 + 250 * static_cast<std::uint32_t>(domain) + 10 + 2 * port;
-      qos.wire_protocol().builtin.initialPeersList.push_back(peer);
+  Topics(int domain, bool reliable, const ear::Calibration& calibration, OdometryLog& odometry)
+      : vehicle_(domain), odometry_(odometry), resolution_(calibration.encoder ? calibration.encoder->resolution : 1) {
+    const fast_dds::Offer samples{reliable}, images{reliable, false, false, 8};
+    vehicle_.publish("/imu0", "Imu", samples);
+    if (calibration.encoder) vehicle_.publish("/wheels", "JointState", samples);
+    const std::size_t beams = calibration.lasers ? calibration.lasers->beams.size() : 0;
+    for (std::size_t i = 0; i < beams; ++i) vehicle_.publish("/laser/" + std::to_string(i), "Range", samples);
+    for (std::size_t i = 0; i < calibration.cameras.size(); ++i) {
+      vehicle_.publish("/cam" + std::to_string(i) + "/image_raw", "Image", images);
     }
-    participant_ = DomainParticipantFactory::get_instance()->create_participant(domain, qos);
-    publisher_ = participant_->create_publisher(PUBLISHER_QOS_DEFAULT);
-    subscriber_ = participant_->create_subscriber(SUBSCRIBER_QOS_DEFAULT);
   }
 
-  void publish(const std::string& topic, const std::string& type) {
-    DataWriterQos qos = DATAWRITER_QOS_DEFAULT;
-    qos.reliability().kind = reliable_ ? RELIABLE_RELIABILITY_QOS : BEST_EFFORT_RELIABILITY_QOS;
-    qos.history().kind = KEEP_LAST_HISTORY_QOS;
-    qos.history().depth = topic.find("image") == std::string::npos ? 400 : 8;
-    qos.publish_mode().kind = SYNCHRONOUS_PUBLISH_MODE;
-    qos.endpoint().history_memory_policy = eprosima::fastrtps::rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
-    writers_[topic] = publisher_->create_datawriter(make_topic(topic, type), qos);
+  /// False: nobody reads them within 30 s.
+  bool wait_for_readers() {
+    const SteadyClock::time_point began = SteadyClock::now();
+    while (!vehicle_.is_heard()) {
+      if (SteadyClock::now() - began > std::chrono::seconds(30)) return false;
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(300));  // the other side is done with discovery, too
+    vehicle_.subscribe("/ear/odometry", "nav_msgs::msg::dds_::Odometry_",
+                       [this](fast_dds::Bytes bytes) { odometry_.take(fast_dds::odometry(std::move(bytes))); });
+    return true;
   }
 
-  void subscribe(const std::string& topic, const std::string& type, DataReaderListener& listener) {
-    DataReaderQos qos = DATAREADER_QOS_DEFAULT;
-    qos.reliability().kind = RELIABLE_RELIABILITY_QOS;
-    qos.history().depth = 100;
-    qos.endpoint().history_memory_policy = eprosima::fastrtps::rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
-    subscriber_->create_datareader(make_topic(topic, type), qos, &listener);
+  void send(const ear::ImuSample& s) {
+    vehicle_.write("/imu0", fast_dds::imu(s));
+    ++inertial_;
   }
-
-  /// Are all topics read by somebody?
-  [[nodiscard]] bool is_heard() const {
-    return std::all_of(writers_.begin(), writers_.end(), [](const auto& writer) {
-      PublicationMatchedStatus status;
-      writer.second->get_publication_matched_status(status);
-      return status.current_count > 0;
-    });
+  void send(const ear::EncoderSample& s) {
+    vehicle_.write("/wheels", fast_dds::joints(s, static_cast<double>(resolution_)));
   }
+  void send(const ear::LaserSample& s) {
+    for (std::size_t i = 0; i < s.range.size(); ++i) {
+      vehicle_.write("/laser/" + std::to_string(i), fast_dds::range(s.t_ns, s.range[i]));
+    }
+  }
+  void send(const ear::StereoFrame& s) {
+    odometry_.sends(s.t_ns);
+    vehicle_.write("/cam0/image_raw", fast_dds::image(s.t_ns, s.left));
+    if (!s.right.empty()) vehicle_.write("/cam1/image_raw", fast_dds::image(s.t_ns, s.right));
+  }
+  [[nodiscard]] std::uint64_t inertial() const { return inertial_; }
 
-  void write(const std::string& topic, Bytes bytes) { writers_.at(topic)->write(&bytes); }
-  void leave() {
-    participant_->delete_contained_entities();
-    DomainParticipantFactory::get_instance()->delete_participant(participant_);
+ private:
+  fast_dds::Vehicle vehicle_;
+  OdometryLog& odometry_;
+  std::int64_t resolution_;
+  std::uint64_t inertial_ = 0;
+};
+
+/// What a vehicle's sensors go on to say when it stands: the last of each, anew, with other noise in the images.
+class Standing {
+ public:
+  explicit Standing(const ear::Calibration& calibration) : calibration_(calibration) {}
+
+  void saw(const ear::ImuSample& s) { imu_ = s; }
+  void saw(const ear::EncoderSample& s) { wheels_ = s; }
+  void saw(const ear::LaserSample& s) { ranges_ = s; }
+  void saw(const ear::RecordedFrame& s) { frame_ = s; }
+
+  /// Sends each sensor's reading that is due by `until_ns`, in the order of time.
+  template <typename Wait>
+  void go_on(std::int64_t until_ns, Topics& topics, const Wait& wait) {
+    const auto period = [](double rate_hz) { return static_cast<std::int64_t>(1e9 / rate_hz); };
+    const std::int64_t imu = period(calibration_.imu.rate_hz), camera = period(calibration_.cameras.front().rate_hz);
+    const std::int64_t wheels = calibration_.encoder ? period(calibration_.encoder->rate_hz) : 0;
+    const std::int64_t lasers = calibration_.lasers ? period(calibration_.lasers->rate_hz) : 0;
+    while (imu_.t_ns + imu < until_ns) {
+      imu_.t_ns += imu;
+      wait(imu_.t_ns);
+      if (wheels > 0 && wheels_.t_ns + wheels <= imu_.t_ns) {
+        wheels_.t_ns += wheels;
+        topics.send(wheels_);
+      }
+      if (lasers > 0 && ranges_.t_ns + lasers <= imu_.t_ns) {
+        ranges_.t_ns += lasers;
+        topics.send(ranges_);
+      }
+      topics.send(imu_);
+      if (frame_.t_ns + camera > imu_.t_ns) continue;
+      frame_.t_ns += camera;
+      topics.send(with_noise(frame_));
+    }
   }
 
  private:
-  Topic* make_topic(const std::string& topic, const std::string& type) {
-    const TypeSupport support(new BytesType(type));
-    support.register_type(participant_);
-    return participant_->create_topic("rt" + topic, type, TOPIC_QOS_DEFAULT);
+  ear::StereoFrame with_noise(const ear::RecordedFrame& frame) {
+    ear::StereoFrame noisy{frame.t_ns, frame.left, frame.right};
+    std::size_t camera = 0;
+    for (ear::ImageView* const view : {&noisy.left, &noisy.right}) {
+      std::vector<std::uint8_t>& pixels = pixels_[camera++];
+      pixels.assign(view->data, view->data + view->stride * view->height);
+      for (std::size_t i = rng_() % 7; i < pixels.size(); i += 1 + rng_() % 7) {
+        if (pixels[i] < 250) pixels[i] = static_cast<std::uint8_t>(pixels[i] + rng_() % 3);
+      }
+      view->data = pixels.data();
+    }
+    return noisy;
   }
 
-  bool reliable_;
-  DomainParticipant* participant_ = nullptr;
-  Publisher* publisher_ = nullptr;
-  Subscriber* subscriber_ = nullptr;
-  std::map<std::string, DataWriter*> writers_;
+  const ear::Calibration& calibration_;
+  ear::ImuSample imu_;
+  ear::EncoderSample wheels_;
+  ear::LaserSample ranges_;
+  ear::RecordedFrame frame_;
+  std::array<std::vector<std::uint8_t>, 2> pixels_;
+  std::minstd_rand rng_{1};
 };
 
 int play(const std::string& folder, int domain, bool reliable, const std::string& log, double seconds) {
   ear::Recording recording(folder);
-  const ear::Calibration& calibration = recording.calibration();
-  Vehicle vehicle(domain, reliable);
-  vehicle.publish("/imu0", "sensor_msgs::msg::dds_::Imu_");
-  if (calibration.encoder) vehicle.publish("/wheels", "sensor_msgs::msg::dds_::JointState_");
-  const std::size_t beams = calibration.lasers ? calibration.lasers->beams.size() : 0;
-  for (std::size_t i = 0; i < beams; ++i) {
-    vehicle.publish("/laser/" + std::to_string(i), "sensor_msgs::msg::dds_::Range_");
+  OdometryLog odometry(log);
+  Topics topics(domain, reliable, recording.calibration(), odometry);
+  Standing standing(recording.calibration());
+  if (!topics.wait_for_readers()) {
+    std::cerr << "nobody reads the topics\n";
+    return EXIT_FAILURE;
   }
-  for (std::size_t i = 0; i < calibration.cameras.size(); ++i) {
-    vehicle.publish("/cam" + std::to_string(i) + "/image_raw", "sensor_msgs::msg::dds_::Image_");
-  }
-  const SteadyClock::time_point began = SteadyClock::now();
-  while (!vehicle.is_heard()) {
-    if (SteadyClock::now() - began > std::chrono::seconds(30)) {
-      std::cerr << "nobody reads the topics\n";
-      return EXIT_FAILURE;
-    }
-    std::this_thread::sleep_for(std::chrono::milliseconds(20));
-  }
-  std::this_thread::sleep_for(std::chrono::milliseconds(300));  // the other side is done with discovery, too
-
   const SteadyClock::time_point start = SteadyClock::now();
-  OdometryLog odometry(log, start);
-  vehicle.subscribe("/ear/odometry", "nav_msgs::msg::dds_::Odometry_", odometry);
   const std::int64_t first_ns = recording.span().first_ns;
-  const double resolution = calibration.encoder ? static_cast<double>(calibration.encoder->resolution) : 1.0;
-  std::uint64_t inertial = 0;
+  const auto wait = [&](std::int64_t t_ns) {
+    std::this_thread::sleep_until(start + std::chrono::nanoseconds(t_ns - first_ns));
+  };
+  const std::int64_t end_ns =
+      seconds > 0.0 ? first_ns + static_cast<std::int64_t>(1e9 * seconds) : std::numeric_limits<std::int64_t>::max();
   while (const auto sample = recording.next()) {
-    const std::int64_t t_ns = ear::time_of(*sample) - first_ns;
-    if (seconds > 0.0 && 1e-9 * static_cast<double>(t_ns) > seconds) break;
-    std::this_thread::sleep_until(start + std::chrono::nanoseconds(t_ns));
-    std::visit(ear::Overloaded{[&](const ear::ImuSample& s) {
-                                 vehicle.write("/imu0", imu(s));
-                                 ++inertial;
-                               },
-                               [&](const ear::EncoderSample& s) { vehicle.write("/wheels", joints(s, resolution)); },
-                               [&](const ear::LaserSample& s) {
-                                 for (std::size_t i = 0; i < s.range.size(); ++i) {
-                                   vehicle.write("/laser/" + std::to_string(i), range(s.t_ns, s.range[i]));
-                                 }
-                               },
-                               [&](const ear::RecordedFrame& s) {
-                                 vehicle.write("/cam0/image_raw", image(s.t_ns, s.left));
-                                 if (!s.right.empty()) vehicle.write("/cam1/image_raw", image(s.t_ns, s.right));
-                               }},
-               *sample);
+    const std::int64_t t_ns = ear::time_of(*sample);
+    if (t_ns > end_ns) break;
+    wait(t_ns);
+    std::visit(
+        [&](const auto& s) {
+          standing.saw(s);
+          topics.send(s);
+        },
+        *sample);
   }
+  if (seconds > 0.0) standing.go_on(end_ns, topics, wait);
   std::this_thread::sleep_for(std::chrono::milliseconds(500));  // the last estimates
-  std::cout << inertial << " inertial samples\n";
-  vehicle.leave();
+  std::cout << topics.inertial() << " inertial samples\n";
   return EXIT_SUCCESS;
 }
 

@@ -22,6 +22,11 @@ class Drone(unittest.TestCase):
         self.assertGreater(len(commands), 3)
         environment = {**os.environ, "PATH": f"{PROGRAM.parent}:{os.environ['PATH']}"}
         with tempfile.TemporaryDirectory() as folder:
+            # Those of its sh blocks are for the vehicle: here with the rehearsal in place of its sensors.
+            (Path(folder) / "live.yaml").write_text("calibration: rehearsal\n", encoding="utf-8")
+            on_board = re.findall(r"^ear .*$", "".join(re.findall(r"^```sh\n(.*?)^```", page, re.DOTALL | re.MULTILINE)), re.MULTILINE)
+            self.assertTrue(on_board)
+            commands += [c.replace("/etc/ear/", "").replace("ear live", "ear live --sensors rehearsal") for c in on_board]
             for command in commands:
                 done = subprocess.run(command, shell=True, cwd=folder, env=environment, stdin=subprocess.DEVNULL,
                                       capture_output=True, text=True, check=False)

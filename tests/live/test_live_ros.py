@@ -14,12 +14,11 @@ import time
 import unittest
 from pathlib import Path
 
+import loopback
+
 PROGRAM, PLAYER = Path(sys.argv.pop(1)).resolve(), Path(sys.argv.pop(1)).resolve()
 
-# Everything on the loopback interface, and no multicast, which that has not.
-os.environ["CYCLONEDDS_URI"] = """<CycloneDDS><Domain><General><Interfaces><NetworkInterface name="lo"/></Interfaces>
-<AllowMulticast>false</AllowMulticast></General><Discovery><ParticipantIndex>auto</ParticipantIndex>
-<Peers><Peer Address="127.0.0.1"/></Peers></Discovery></Domain></CycloneDDS>"""
+os.environ["CYCLONEDDS_URI"] = loopback.URI
 
 SECONDS = 5
 CONFIG = """calibration: {recording}

@@ -107,6 +107,26 @@ TEST_CASE("ros output: the velocity is that of the vehicle's frame, in its own a
   CHECK(message.pose.pose.position.z == doctest::Approx(1.0));
 }
 
+TEST_CASE("ros output: the frames lead from base_link to the sensors, also without wheels") {
+  Eigen::Isometry3d T_B_base = Eigen::Isometry3d::Identity();
+  T_B_base.linear() = turned({0.1, -0.2, 0.3}).toRotationMatrix();
+  T_B_base.translation() = Eigen::Vector3d(0.1, 0.2, -0.3);
+  Calibration calibration;
+  calibration.cameras.resize(1);
+  calibration.cameras[0].T_BC.translation() = Eigen::Vector3d(0.05, 0.0, 0.02);
+  const auto frames = RosMessages({}, T_B_base).frames(calibration, 1'700'000'000'000'000'000).transforms;
+  REQUIRE(frames.size() == 2);
+  CHECK(frames[0].header.frame_id == "base_link");
+  CHECK(frames[0].child_frame_id == "imu0");
+  CHECK(frames[1].header.frame_id == "imu0");
+  CHECK(frames[1].child_frame_id == "cam0");
+  const auto& [p, q] = frames[0].transform;  // takes coordinates of the IMU to base_link
+  const Eigen::Vector3d zero =
+      Eigen::Quaterniond(q.w, q.x, q.y, q.z) * T_B_base.translation() + Eigen::Vector3d(p.x, p.y, p.z);
+  CHECK(zero.norm() < 1e-12);  // base_link's origin
+  CHECK(frames[1].transform.translation.x == doctest::Approx(0.05));
+}
+
 TEST_CASE("ros output: the path grows with the way, and not without end") {
   RosPath path("odom");
   ros2::Odometry message;

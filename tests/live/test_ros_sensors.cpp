@@ -1,5 +1,7 @@
 // Topics over the loopback interface, from one participant to another of this process.
+#include "ear/odometry.h"
 #include "src/live/ros_calibration.h"
+#include "src/live/ros_publisher.h"
 #include "src/live/ros_sensors.h"
 
 #include <doctest/doctest.h>
@@ -11,6 +13,7 @@
 #include "src/live/ros_calibration.h"
 #include "src/ros2/cdr.h"
 #include "src/ros2/outgoing.h"
+#include "tests/live/live_setup.h"
 
 using namespace ear;
 using namespace ear::live;
@@ -21,22 +24,13 @@ using namespace std::chrono_literals;
 
 /// Everything stays on this machine, whatever its network is.
 int loopback_domain() {
-  ::setenv("CYCLONEDDS_URI",
-           "<CycloneDDS><Domain><General><Interfaces><NetworkInterface name=\"lo\"/></Interfaces>"
-           "<AllowMulticast>false</AllowMulticast></General><Discovery><ParticipantIndex>auto</ParticipantIndex>"
-           "<Peers><Peer Address=\"127.0.0.1\"/></Peers></Discovery></Domain></CycloneDDS>",
-           1);
+  test::use_loopback();
   return 71;
 }
 
 Calibration stereo() {
   Calibration calibration;
-  CameraCalibration camera;
-  camera.width = 64;
-  camera.height = 48;
-  camera.fu = camera.fv = 50.0;
-  camera.cu = 31.5;
-  camera.cv = 23.5;
+  CameraCalibration camera = test::small_camera();
   camera.rate_hz = 50.0;
   camera.T_BC.translation() = Eigen::Vector3d(0.1, 0.05, 0.0);
   calibration.cameras = {camera, camera};
@@ -64,7 +58,7 @@ class Vehicle {
              bool latched = false) {
     auto& writer = writers_[topic];
     if (!writer)
-      writer = std::make_unique<dds::Writer>(participant_, topic, type, dds::Writer::Options{true, latched, 50});
+      writer = std::make_unique<dds::Writer>(participant_, topic, type, dds::Writer::Options{true, latched, 50, ""});
     CHECK(writer->write(cdr));
   }
   void image(std::size_t camera, TimeNs t_ns) {
@@ -165,6 +159,86 @@ TEST_CASE("ros sensors: samples arrive; broken messages and wrong types are said
   }));
   CHECK(contains(said, topics().imu + ": has a publisher"));
   for (const std::string& text : said) INFO(text);
+}
+
+TEST_CASE("ros publisher: who joins later gets the frames, and topics say the hashes of their types") {
+  const dds::Participant participant(loopback_domain());
+  const RosMessages messages({}, Eigen::Isometry3d::Identity());
+  RosPublisher publisher(participant, messages, nullptr);
+  publisher.publish_frames(participant, messages.frames(stereo(), 1'700'000'000'000'000'000));
+  std::this_thread::sleep_for(200ms);
+
+  const dds::Participant late(loopback_domain());
+  std::atomic<std::size_t> frames{0};
+  dds::Subscription subscription(late, {{"/tf_static", ros2::TfMessage::kType, 10}}, [&](const dds::Received& message) {
+    frames = ros2::decode<ros2::TfMessage>({message.cdr.data, message.cdr.size}).transforms.size();
+  });
+  CHECK(eventually([&] { return frames > 0; }));
+  CHECK(frames == 3);  // the IMU and two cameras
+  const auto says = [&](const std::string& topic, const std::string& user_data) {
+    for (const dds::Publication& one : late.publications()) {
+      if (one.topic == topic) return one.user_data == user_data;
+    }
+    return false;
+  };
+  CHECK(eventually([&] {
+    return says("/ear/odometry", "typehash=RIHS01_3cc97dc7fb7502f8714462c526d369e35b603cfc34d946e3f2eda2766dfec6e0;") &&
+           says("/tf", "typehash=RIHS01_e369d0f05a23ae52508854b66f6aa0437f3449d652e8cbf22d5abe85d020f087;");
+  }));
+}
+
+TEST_CASE("ros publisher: images with their features, once somebody reads them") {
+  const dds::Participant participant(loopback_domain()), other(loopback_domain());
+  RosNames names;
+  names.features = "/ear/features";
+  RosPublisher publisher(participant, RosMessages(names, Eigen::Isometry3d::Identity()), nullptr);
+  publisher.publish_features(participant, stereo().cameras[0]);
+  Odometry odometry(Config{}, stereo());
+  const std::vector<std::uint8_t> pixels(64 * 48, 100);
+  StereoFrame frame;
+  frame.t_ns = 1'700'000'000'000'000'000;
+  frame.left = frame.right = {pixels.data(), 64, 48, 64};
+  std::atomic<TimeNs> heard{0};
+  dds::Subscription subscription(other, {{names.features, ros2::Image::kType, 2}}, [&](const dds::Received& message) {
+    const auto image = ros2::decode<ros2::Image>({message.cdr.data, message.cdr.size});
+    if (image.encoding == "bgr8" && image.data.size() == 3 * pixels.size())
+      heard = ros2::nanoseconds(image.header.stamp);
+  });
+  CHECK(eventually([&] {
+    frame.t_ns += 50'000'000;
+    odometry.add_imu({frame.t_ns, Eigen::Vector3d::Zero(), Eigen::Vector3d(0.0, 0.0, 9.81)});
+    publisher.take(frame);
+    static_cast<void>(odometry.add_stereo(frame));
+    publisher.show(odometry);
+    return heard > 0;
+  }));
+}
+
+TEST_CASE("ros sensors: after a pause the topics go on together, none far ahead of the others") {
+  const dds::Participant participant(loopback_domain());
+  Vehicle vehicle;
+  std::array<std::atomic<int>, 2> count{};
+  std::atomic<bool> pause{true};
+  std::atomic<int> farthest{0};
+  dds::Subscription subscription(participant, {{"/a", ros2::Imu::kType, 500}, {"/b", ros2::Imu::kType, 500}},
+                                 [&](const dds::Received& message) {
+                                   ++count[message.what.topic == "/a" ? 0 : 1];
+                                   while (pause && count[0] > 0 && count[1] > 0) std::this_thread::sleep_for(5ms);
+                                   if (!pause) farthest = std::max(farthest.load(), std::abs(count[0] - count[1]));
+                                 });
+  const ros2::Imu imu = ros2::imu_message({1'700'000'000'000'000'000, {}, {}});
+  REQUIRE(eventually([&] {
+    for (const char* topic : {"/a", "/b"}) vehicle.send(topic, imu);
+    return count[0] > 0 && count[1] > 0;
+  }));
+  const int before = std::abs(count[0] - count[1]);
+  for (int i = 0; i < 40; ++i) {
+    for (const char* topic : {"/a", "/b"}) vehicle.send(topic, imu);
+  }
+  std::this_thread::sleep_for(200ms);  // all of them wait now
+  pause = false;
+  CHECK(eventually([&] { return count[0] > 40 && count[1] > 40; }));
+  CHECK(farthest <= before + 8);
 }
 
 TEST_CASE("ros sensors: names on the wire") {

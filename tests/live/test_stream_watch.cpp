@@ -75,3 +75,34 @@ TEST_CASE("stream watch: a clock that is set") {
   CHECK(contains(feed(watch, 2000, 3000, 200.0, 6000), "imu: its clock was set by +1.000 s"));
   CHECK(contains(feed(watch, 3000, 4000, 200.0, 5500), "imu: its clock was set by -0.500 s"));
 }
+
+TEST_CASE("stream watch: samples that waited are no clock that was set") {
+  constexpr TimeNs kMs = 1'000'000;
+  StreamWatch watch("imu", 200.0, 0);
+  std::vector<std::string> words;
+  for (TimeNs t_ns = 5 * kMs; t_ns < 4000 * kMs; t_ns += 5 * kMs) {
+    const bool stalled = t_ns > 2000 * kMs && t_ns < 2400 * kMs;
+    watch.note(t_ns, stalled ? 2400 * kMs : t_ns);
+    if (t_ns % (200 * kMs) == 0 && !stalled) {
+      for (std::string& text : watch.look(t_ns)) words.push_back(std::move(text));
+    }
+  }
+  CHECK_FALSE(contains(words, "clock"));
+}
+
+TEST_CASE("stream watch: a clock that is set again and again does not fill the log") {
+  StreamWatch watch("imu", 200.0, 0);
+  std::size_t words = 0;
+  std::string all;
+  for (int second = 0; second < 40; ++second) {
+    for (const std::string& text :
+         feed(watch, 1000 * second + 1, 1000 * (second + 1), 200.0, second % 2 == 0 ? 0 : 3000)) {
+      if (text.find("clock was set") == std::string::npos) continue;
+      ++words;
+      all += text;
+    }
+  }
+  CHECK(words >= 6);
+  CHECK(words <= 15);  // 39 steps
+  CHECK(all.find("times before") != std::string::npos);
+}

@@ -327,3 +327,43 @@ TEST_CASE("pairing: a camera that stops holds up nothing for long") {
   mono.take(0, empty_image(kMs), frames, warnings);
   CHECK(frames.size() == 1);
 }
+
+TEST_CASE("images: one stamp that is far ahead does not end the stream, nor does a clock that is set back") {
+  StereoPairing pairing(false);
+  std::vector<RecordedFrame> frames;
+  Warnings warnings;
+  const auto take = [&](TimeNs t_ns) {
+    GreyImage grey;
+    grey.t_ns = grey.arrival_ns = t_ns;
+    grey.pixels = cv::Mat(2, 2, CV_8UC1, cv::Scalar(1));
+    pairing.take(0, std::move(grey), frames, warnings);
+  };
+  take(kStart);
+  take(kStart + 3'600'000 * kMs);  // false
+  for (int i = 1; i <= 20; ++i) take(kStart + i * 33 * kMs);
+  REQUIRE(frames.size() == 2 + 16);
+  CHECK(frames[2].t_ns == kStart + 5 * 33 * kMs);
+  for (int i = 0; i < 10; ++i) take(kStart - 5000 * kMs + i * 33 * kMs);
+  CHECK(frames.size() == 18 + 6);
+  take(kStart - 5000 * kMs);  // one that is late stays out
+  take(kStart - 4000 * kMs);
+  CHECK(frames.size() == 25);
+}
+
+TEST_CASE("imu apart: one stamp that is far ahead ends neither rates nor accelerations") {
+  for (const char* broken : {"/gyro", "/accel"}) {
+    CAPTURE(broken);
+    ImuMessages messages(apart());
+    std::vector<ImuSample> samples;
+    Warnings warnings;
+    for (int i = 0; i < 100; ++i) {
+      const TimeNs t_ns = kStart + i * 5 * kMs;
+      const auto stamp = [&](const char* topic) {
+        return topic == std::string(broken) && i == 10 ? t_ns + 60'000 * kMs : t_ns;
+      };
+      messages.take(Sent("/gyro", rate(stamp("/gyro"), 1.0)), samples, warnings);
+      messages.take(Sent("/accel", acceleration(stamp("/accel"), 2.0)), samples, warnings);
+    }
+    CHECK(samples.size() > 85);
+  }
+}
