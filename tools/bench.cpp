@@ -17,7 +17,6 @@
 #include <vector>
 
 #include "ear/odometry.h"
-#include "src/recording/config_file.h"
 #include "src/recording/recording.h"
 #include "tools/allocation_counter.h"
 #include "tools/bench_figures.h"
@@ -26,6 +25,7 @@
 #include "tools/input_options.h"
 #include "tools/opened_recording.h"
 #include "tools/processor_time.h"
+#include "tools/program_config.h"
 #include "tools/replay.h"
 
 namespace ear::tools {
@@ -181,7 +181,7 @@ BenchFigures read_figures(const std::filesystem::path& file) {
 
 void bench(const BenchArguments& args) {
   cv::setNumThreads(1);
-  const Config config = args.config.empty() ? Config{} : load_config(args.config);
+  const Config config = program_config(args.config);
   std::optional<BenchFigures> before;  // read first: a wrong file is said at once
   if (!args.compare.empty()) before = read_figures(args.compare);
   const OpenedRecording opened(args.recording, args.config);

@@ -8,6 +8,7 @@
 #include "src/log/log.h"
 #include "tools/commands.h"
 #include "tools/log_options.h"
+#include "tools/version.h"
 
 namespace {
 
@@ -25,6 +26,7 @@ void refuse_unknown_subcommand(const CLI::App& app) {
 int run_subcommand(int argc, char** argv) {
   CLI::App app{"ear: where a vehicle that drives and flies is, from cameras, IMU, wheels and lasers"};
   app.require_subcommand(1);
+  app.set_version_flag("--version", ear::tools::version_text);
   ear::tools::add_run_command(app);
   ear::tools::add_live_command(app);
   ear::tools::add_simulate_command(app);

@@ -25,8 +25,10 @@
 #include "tools/flight_controller.h"
 #include "tools/input_options.h"
 #include "tools/opened_recording.h"
+#include "tools/program_config.h"
 #include "tools/progress.h"
 #include "tools/replay.h"
+#include "tools/run_view.h"
 
 namespace ear::tools {
 namespace {
@@ -42,6 +44,7 @@ struct RunArguments {
   std::optional<OdometerModel> odometer;
   std::string estimator = "filter";
   FlightControllerArguments flight_controller;
+  RunViewArguments view;
 };
 
 constexpr std::size_t kMostChanges = 1000;  // of the health, in summary.json
@@ -166,7 +169,7 @@ RunSummary summarize(const RunArguments& args, const Recording& recording, const
 
 void run(const RunArguments& args) {
   cv::setNumThreads(1);  // the same result whatever the machine
-  Config config = args.config.empty() ? Config{} : load_config(args.config);
+  Config config = program_config(args.config);
   if (args.odometer) config.filter.odometer.model = *args.odometer;
   RecordingOptions options;
   options.calibration_files = args.calibration;
@@ -177,7 +180,10 @@ void run(const RunArguments& args) {
   if (const auto missing = check_sensors(recording.calibration())) {
     throw InputError(located(args.recording, 0, missing->where, missing->message));
   }
-  Odometry odometry = OdometryFactory::make(config, recording.calibration(), estimator_named(args.estimator));
+  std::optional<RunView> view;
+  if (args.view.port >= 0) view.emplace(args.view, args.recording, recording);
+  const MakeEstimator make = estimator_named(args.estimator);
+  Odometry odometry = OdometryFactory::make(config, recording.calibration(), view ? view->tapped(make) : make);
   if (!args.start.empty()) odometry.start_at(load_start(args.start, recording.span()));
 
   std::filesystem::create_directories(args.out);
@@ -190,6 +196,7 @@ void run(const RunArguments& args) {
     flight_controller.emplace(args.flight_controller, recording.calibration(), recording.span().first_ns);
   }
   const auto before_sample = [&](const Sample& sample) {
+    if (view) view->before_sample(sample);
     if (flight_controller) flight_controller->before_sample(sample, odometry);
   };
 
@@ -201,6 +208,7 @@ void run(const RunArguments& args) {
   };
   const auto on_frame = [&](const ReplayedFrame& frame) {
     if (flight_controller) flight_controller->after_frame(frame, odometry);
+    if (view) view->after_frame(frame, odometry);
     totals.add(frame, odometry.stage_times());
     totals.add(frame.t_ns, odometry.health());
     if (frame.estimate) {
@@ -221,6 +229,7 @@ void run(const RunArguments& args) {
                 static_cast<unsigned long long>(totals.reduced), config.performance.budget_ms, totals.most_reduced);
   }
   if (flight_controller) std::printf("%s\n", flight_controller->report().c_str());
+  if (view) std::printf("%s\n", view->finish().c_str());
   for (const Warning& warning : recording.warnings()) {
     log_warning(warning.kind + ", " + std::to_string(warning.count) + " times, first at " + warning.first);
   }
@@ -255,6 +264,7 @@ void add_run_command(CLI::App& app) {
       ->check(CLI::IsMember(estimator_names()))
       ->capture_default_str();
   add_options(*command, args->flight_controller);
+  add_options(*command, args->view);
   command->callback([args] { run(*args); });
 }
 

@@ -36,7 +36,8 @@ LAYERS = {
     "filter/health/": ["filter/health/", "filter/ingest/", *RECORDS, "filter/advice.h", "include/ear/", "eigen", "freestanding"],
     "smoother/": ["smoother/", *FILTER, "include/ear/", "eigen", "ceres", "freestanding"],
     "calibration/": ["calibration/", "smoother/", *FILTER, "include/ear/", "eigen", "ceres", "freestanding"],
-    "frontend/": ["frontend/", "include/ear/", "eigen", "opencv", *STANDARD],
+    "frontend/": ["frontend/", "frontend/eight.h", "include/ear/", "eigen", "opencv", *STANDARD],
+    "frontend/eight.h": ["vector unit", "freestanding"],
     "src/": ["src/", "src/log/", *FILTER, "frontend/", "include/ear/", "eigen", "opencv", *STANDARD],
     "src/log/": ["src/log/", "include/ear/", "spdlog", "posix", *STANDARD],
     "src/recording/": ["src/recording/", "src/log/", "include/ear/", "eigen", "opencv", "yaml-cpp", "json", *STANDARD],
@@ -46,6 +47,7 @@ LAYERS = {
     "src/ros2/": ["src/ros2/", "src/recording/", "include/ear/", "eigen", "opencv", "fastcdr", *STANDARD],
     "src/rosbag2/": ["src/rosbag2/", "src/ros2/", "src/recording/", "src/log/", "include/ear/", "eigen", "posix", *STANDARD],
     "src/dds/": ["src/dds/", "include/ear/", "cyclone", *STANDARD],
+    "src/view/": ["src/view/", "src/", *FILTER, "frontend/", "include/ear/", "eigen", "opencv", "json", "httplib", "posix", *STANDARD],
     "src/live/": ["src/live/", "src/", "src/dds/", "src/ros2/", "src/rosbag2/", "src/mavlink/", "src/recording/", "src/log/",
                   *FILTER, "include/ear/", "eigen", "opencv", "posix", "yaml-cpp", *STANDARD],
     # Simulated truth shares no code with the models, and an evaluation does not know what made the estimate.
@@ -54,8 +56,9 @@ LAYERS = {
 }
 EVERYTHING = [*LAYERS, "eigen", "opencv", "yaml-cpp", "json", "spdlog", "posix", "ceres", *STANDARD]
 LAYERS["tools/"] = ["tools/", "cli11", *EVERYTHING]
-LAYERS["tests/"] = ["tests/", "tools/", "doctest", *EVERYTHING]
-LAYERS["tests/live/fast_dds_player.cpp"] = ["include/ear/", "src/recording/", "fastdds", "fastcdr", *STANDARD]
+LAYERS["tests/"] = ["tests/", "tests/live/fast_dds_", "tools/", "doctest", *EVERYTHING]
+LAYERS["tests/live/fast_dds_"] = ["tests/live/fast_dds_", "include/ear/", "src/recording/", "fastdds", "fastcdr", *STANDARD]
+LAYERS["python/"] = ["python/", "tools/", "pybind11", *EVERYTHING]
 LAYERS["tests/tools/consumer/"] = ["include/ear/", *FILTER, *STANDARD]
 LAYERS["examples/c/"] = ["include/ear/", "posix", *STANDARD]
 LAYERS["examples/mavlink/"] = ["include/ear/", "src/mavlink/", *STANDARD]
@@ -68,9 +71,11 @@ HOSTED = ["atomic", "chrono", "condition_variable", "cstdio", "ctime", "filesyst
           "mutex", "shared_mutex", "thread"]
 
 LIBRARIES = {"Eigen": "eigen", "unsupported": "eigen", "opencv2": "opencv", "yaml-cpp": "yaml-cpp", "spdlog": "spdlog",
-             "nlohmann": "json", "CLI": "cli11", "doctest": "doctest", "sys": "posix", "ceres": "ceres", "glog": "ceres",
+             "nlohmann": "json", "CLI": "cli11", "doctest": "doctest", "sys": "posix", "arpa": "posix", "netinet": "posix", "ceres": "ceres", "glog": "ceres",
              "fastcdr": "fastcdr", "dds": "cyclone", "fastdds": "fastdds", "linux": "posix", "rosbag": "ros",
-             "sensor_msgs": "ros", "geometry_msgs": "ros"}
+             "pybind11": "pybind11", "httplib.h": "httplib", "sensor_msgs": "ros", "geometry_msgs": "ros"}
+
+VECTOR_UNIT = ["arm_neon.h", "emmintrin.h", "immintrin.h", "smmintrin.h"]  # what compilers offer of the processor's
 
 INCLUDE = re.compile(r'^\s*#\s*include\s*["<]([^">]+)[">]')
 
@@ -87,8 +92,10 @@ def target_of(root, includer, name):
             return layer_of(file.relative_to(root))
     if "/" in name:
         return LIBRARIES.get(name.split("/")[0])
+    if name in VECTOR_UNIT:
+        return "vector unit"
     if name.endswith(".h"):
-        return "freestanding" if name in ("stddef.h", "stdint.h") else "posix"
+        return LIBRARIES.get(name, "freestanding" if name in ("stddef.h", "stdint.h") else "posix")
     return "hosted" if name in HOSTED else "freestanding"
 
 

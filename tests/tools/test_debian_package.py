@@ -25,7 +25,8 @@ class DebianPackage(unittest.TestCase):
         cls.folder = tempfile.TemporaryDirectory()
         cls.addClassCleanup(cls.folder.cleanup)
         output_of(CPACK, "-G", "DEB", "-B", cls.folder.name, cwd=BUILD)
-        (cls.package,) = Path(cls.folder.name).glob("*.deb")
+        (cls.package,) = Path(cls.folder.name).glob("ear-msckf_*.deb")
+        cls.python = next(Path(cls.folder.name).glob("python3-ear_*.deb"), None)
 
     def field(self, name):
         return output_of("dpkg-deb", "--field", self.package, name).strip()
@@ -60,6 +61,22 @@ class DebianPackage(unittest.TestCase):
                        "/libear_recording.a", "/libear_live.a", "/systemd/system/ear-live.service", "/cmake/ear/earConfig.cmake"):
             self.assertTrue(any(file.endswith(ending) for file in files), ending)
         self.assertFalse([file for file in files if file.endswith((".cpp", ".o", ".py"))])
+
+    def test_python_package(self):
+        if self.python is None:
+            self.skipTest("the Python module is not built here")
+        self.assertIn("python3-numpy", output_of("dpkg-deb", "--field", self.python, "Depends"))
+        self.assertRegex(output_of("dpkg-deb", "--field", self.python, "Depends"), r"libopencv-imgproc\d+")
+        with tempfile.TemporaryDirectory() as root:
+            output_of("dpkg", "--extract", self.python, root)
+            files = {str(file.relative_to(root)) for file in Path(root).rglob("*") if file.is_file()}
+            self.assertTrue({"usr/lib/python3/dist-packages/ear/__init__.pyi", "usr/lib/python3/dist-packages/ear/py.typed",
+                             "usr/share/doc/python3-ear/copyright"} <= files, files)
+            self.assertTrue(all(file.startswith(("usr/lib/python3/", "usr/share/doc/python3-ear/")) for file in files))
+            names = output_of("/usr/bin/python3", "-c", "import ear; print(ear.sequences(), ear.__file__)", cwd=root,
+                              env={"PYTHONPATH": f"{root}/usr/lib/python3/dist-packages"})
+            self.assertIn("'fly1'", names)
+            self.assertIn(root, names)
 
     def test_program_runs_from_it(self):
         with tempfile.TemporaryDirectory() as root:

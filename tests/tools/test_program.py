@@ -5,6 +5,8 @@ test_program.py EAR_PROGRAM [TEST...]
 
 import csv
 import json
+import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -14,9 +16,9 @@ from pathlib import Path
 PROGRAM = Path(sys.argv.pop(1)).resolve()
 
 
-def ear(*arguments, folder=None):
+def ear(*arguments, folder=None, environment=None):
     command = [str(PROGRAM), *map(str, arguments)]
-    return subprocess.run(command, cwd=folder, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
+    return subprocess.run(command, cwd=folder, env=environment, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
 
 
 POSE = "T_BS: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]\n"
@@ -53,6 +55,17 @@ class CommandLine(unittest.TestCase):
         for subcommand in ("run", "simulate", "evaluate", "check", "bench", "export", "experiments"):
             self.assertIn(subcommand, ear("--help").stdout)
             self.assertEqual(ear(subcommand, "--help").returncode, 0)
+
+    def test_version(self):
+        result = ear("--version")
+        self.assertEqual(result.returncode, 0)
+        self.assertRegex(result.stdout, r"\Aear \d+\.\d+\.\d+, commit ([0-9a-f]{12}(-changed)?|unknown)\n"
+                                        r"kernels: (\w+) \(here are( \w+)*\)\noptional parts:( \w+)+\n\Z")
+        first = re.search(r"here are (\w+)", result.stdout)[1]
+        environment = {**os.environ, "EAR_KERNELS": first}
+        self.assertIn(f"kernels: {first} (", ear("--version", environment=environment).stdout)
+        environment["EAR_KERNELS"] = "mmx"
+        self.assert_refused(ear("bench", ".", environment=environment), 'EAR_KERNELS: no kernels are called "mmx"')
 
     def test_no_arguments(self):
         self.assert_refused(ear(), "subcommand")

@@ -332,75 +332,52 @@ Sequence sway3() {
 
 // What shows every part of the calibration: `ear calibrate --plan`.
 Sequence calibrate() {
-  const auto aside = [](double left) { return in_air(drift(stand(1.4), left)); };
+  // From side to side in a second: the body tilts by 15 to 20 degrees, and its acceleration is well above the noise.
+  const auto aside = [](double left) { return in_air(drift(stand(1.0), left)); };
   const auto ahead = [](double forward) {
-    Leg leg = in_air(stand(1.4));
+    Leg leg = in_air(stand(1.0));
     leg.forward = forward;
     return leg;
   };
-  return {"calibrate",
-          "the drive that shows the calibration: swings, turns on the spot, figures of eight, hops with tilts",
-          Terrain(),
-          {4.0, 4.4},
-          0.0,
-          {stand(3.0),
-           sway(10.0, 10.0),
-           spin(400, 1.0),
-           stand(0.5),
-           spin(-400, 1.0),
-           stand(0.5),
-           turn(0.9, 360, 0.8),
-           turn(0.9, -360, 0.8),
-           turn(0.9, 360, 0.9),
-           turn(0.9, -360, 0.9),
-           stand(1.0),
-           drive(4.0, 1.0),
-           stand(0.6),
-           reverse(4.0, 1.0),
-           stand(1.0),
-           take_off(0.4, 1.2),
-           aside(1.0),
-           aside(-1.0),
-           aside(1.0),
-           aside(-1.0),
-           ahead(0.8),
-           ahead(-0.8),
-           stand(0.8),
-           land(0.4),
-           stand(1.5),
-           sway(6.0, 10.0),
-           take_off(1.5, 2.4),
-           aside(1.0),
-           aside(-1.0),
-           ahead(1.0),
-           ahead(-1.0),
-           in_air(spin(90, 0.9)),
-           aside(-1.0),
-           aside(1.0),
-           aside(-1.0),
-           aside(1.0),
-           in_air(spin(-90, 0.9)),
-           stand(0.8),
-           land(1.5),
-           stand(1.5),
-           take_off(0.4, 1.2),
-           aside(-1.0),
-           aside(1.0),
-           aside(-1.0),
-           aside(1.0),
-           stand(0.8),
-           land(0.4),
-           stand(1.0),
-           spin(90, 0.9),
-           drive(2.0, 1.0),
-           stand(0.6),
-           reverse(2.0, 0.8),
-           stand(3.0)}};
+  std::vector<Leg> legs;
+  const auto add = [&legs](std::initializer_list<Leg> more) { legs.insert(legs.end(), more); };
+  const auto shake = [&](int sideways, int lengthways) {
+    for (int i = 0; i < sideways; ++i) add({aside(0.9), aside(-0.9)});
+    for (int i = 0; i < lengthways; ++i) add({ahead(0.9), ahead(-0.9)});
+  };
+  add({stand(3.0), sway(10.0, 10.0), spin(400, 1.0), stand(0.5), spin(-400, 1.0), stand(0.5)});
+  add({turn(0.9, 360, 0.8), turn(0.9, -360, 0.8), turn(0.9, 360, 0.9), turn(0.9, -360, 0.9), stand(1.0)});
+  add({drive(4.0, 1.0), stand(0.6), reverse(4.0, 1.0), stand(1.0)});
+  add({take_off(0.6, 1.5)});  // low and high: a beam's origin is told from its direction
+  shake(6, 0);
+  add({stand(0.8), land(0.6), stand(1.5), sway(6.0, 10.0)});
+  add({take_off(2.2, 3.0)});
+  shake(8, 6);
+  add({in_air(spin(90, 0.9))});
+  shake(7, 0);
+  add({in_air(spin(-90, 0.9)), stand(0.8), land(2.2), stand(1.5)});
+  add({spin(90, 0.9), drive(2.0, 1.0), stand(0.6), reverse(2.0, 0.8), stand(3.0)});
+  return {
+      "calibrate", "the drive that shows the calibration: swings, turns on the spot, figures of eight, hops with tilts",
+      Terrain(),   {4.0, 4.4},
+      0.0,         legs};
+}
+
+// What does not show the calibration.
+Sequence straight() {
+  return {"straight", "stands, drives 7 m straight on, stands", Terrain(), {2.5, 7.6},
+          0.0,        {stand(3.0), drive(7.0, 0.8), stand(3.0)}};
+}
+
+Sequence circle() {
+  return {"circle",  "stands, drives one circle of 1 m radius to the left, stands",
+          Terrain(), {4.0, 4.4},
+          0.0,       {stand(3.0), turn(1.0, 360, 0.7), stand(3.0)}};
 }
 
 std::vector<Sequence> all_sequences() {
-  return {standing(), flat1(), flat2(), flat3(), wave1(), wave2(),      wave3(),      slope(),    lawn(),
-          fly1(),     fly2(),  sway1(), sway2(), sway3(), occlusion1(), occlusion2(), calibrate()};
+  return {standing(), flat1(), flat2(), flat3(), wave1(),      wave2(),      wave3(),     slope(),    lawn(),  fly1(),
+          fly2(),     sway1(), sway2(), sway3(), occlusion1(), occlusion2(), calibrate(), straight(), circle()};
 }
 
 }  // namespace
@@ -413,7 +390,9 @@ std::vector<std::string> all_sequence_names() {
 
 std::vector<std::string> sequence_names() {
   std::vector<std::string> names = all_sequence_names();
-  names.erase(std::remove(names.begin(), names.end(), "calibrate"), names.end());
+  for (const char* name : {"calibrate", "straight", "circle"}) {
+    names.erase(std::remove(names.begin(), names.end(), name), names.end());
+  }
   return names;
 }
 

@@ -51,7 +51,8 @@ struct Sequence {
   Hindrance hindrance = {};
 };
 
-/// The names that `find_sequence` knows, but for `calibrate`: the sequences that estimators are compared on.
+/// The names that `find_sequence` knows, but for `calibrate`, `straight` and `circle`, which are for the calibration:
+/// those that estimators are compared on.
 [[nodiscard]] std::vector<std::string> sequence_names();
 /// All of them.
 [[nodiscard]] std::vector<std::string> all_sequence_names();
