@@ -7,6 +7,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "calibration/bridge.h"
 #include "calibration/lens.h"
 #include "filter/filter.h"
 
@@ -14,6 +15,7 @@ namespace ear::calibration {
 namespace {
 
 constexpr double kLongestGap = 1.0;  // [s] between two states of one piece
+constexpr double kBridged = 12.0;    // [s] that inertial samples alone tell how it moved: a hop without cameras
 constexpr double kShortest = 5.0;    // [s] of a piece
 constexpr TimeNs kTolerance = 5'000'000;
 
@@ -116,6 +118,7 @@ FirstGuess guess_motion(const Drive& drive, const Calibration& given, const Cali
   if (!given.cameras.empty()) settings.odometer.model = OdometerModel::none;
   FirstGuess guess;
   guess.states = Feed(drive, given, now, settings, interval).run();
+  if (given.cameras.empty()) guess.states = bridge_gaps(guess.states, drive.imu, interval, kLongestGap, kBridged);
   keep_longest(guess.states);
   const double length =
       guess.states.empty() ? 0.0 : seconds_between(guess.states.front().state.t_ns, guess.states.back().state.t_ns);

@@ -57,6 +57,7 @@ LAYERS = {
 EVERYTHING = [*LAYERS, "eigen", "opencv", "yaml-cpp", "json", "spdlog", "posix", "ceres", *STANDARD]
 LAYERS["tools/"] = ["tools/", "cli11", *EVERYTHING]
 LAYERS["tests/"] = ["tests/", "tests/live/fast_dds_", "tools/", "doctest", *EVERYTHING]
+LAYERS["tests/calibration/test_mujoco"] = [*LAYERS["tests/"], "mujoco"]
 LAYERS["tests/live/fast_dds_"] = ["tests/live/fast_dds_", "include/ear/", "src/recording/", "fastdds", "fastcdr", *STANDARD]
 LAYERS["python/"] = ["python/", "tools/", "pybind11", *EVERYTHING]
 LAYERS["tests/tools/consumer/"] = ["include/ear/", *FILTER, *STANDARD]
@@ -73,7 +74,7 @@ HOSTED = ["atomic", "chrono", "condition_variable", "cstdio", "ctime", "filesyst
 LIBRARIES = {"Eigen": "eigen", "unsupported": "eigen", "opencv2": "opencv", "yaml-cpp": "yaml-cpp", "spdlog": "spdlog",
              "nlohmann": "json", "CLI": "cli11", "doctest": "doctest", "sys": "posix", "arpa": "posix", "netinet": "posix", "ceres": "ceres", "glog": "ceres",
              "fastcdr": "fastcdr", "dds": "cyclone", "fastdds": "fastdds", "linux": "posix", "rosbag": "ros",
-             "pybind11": "pybind11", "httplib.h": "httplib", "sensor_msgs": "ros", "geometry_msgs": "ros"}
+             "pybind11": "pybind11", "mujoco": "mujoco", "httplib.h": "httplib", "sensor_msgs": "ros", "geometry_msgs": "ros"}
 
 VECTOR_UNIT = ["arm_neon.h", "emmintrin.h", "immintrin.h", "smmintrin.h"]  # what compilers offer of the processor's
 
