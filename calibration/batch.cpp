@@ -234,15 +234,17 @@ void Batch::add_points(std::size_t s) {
       const Eigen::Vector3d v_W = Eigen::Map<const Eigen::Vector3d>(keyframe.motion.data());
       const double still = std::max(0.0, 1.0 - kStill * kStill / std::max(1e-300, v_W.squaredNorm()));
       const Eigen::Vector3d v_B = still * (smoother::to_pose(keyframe.pose.data()).R.transpose() * v_W);
-      PixelObservation observation{seen.left_px, noise_.pixel, keyframe.late, keyframe.rate_B, v_B};
+      PixelObservation observation{seen.left_px, noise_.pixel * noise_.lasting, keyframe.late, keyframe.rate_B, v_B};
       TermBlock term{Term::pixel, nullptr, s, p, 0, keyframe.t_ns, seen.left_px};
-      add_term(term, new LeftPixel(observation, cameras_, point.anchor), new ceres::HuberLoss(kPixelHuber),
+      add_term(term, new LeftPixel(observation, cameras_, point.anchor),
+               new ceres::HuberLoss(kPixelHuber / noise_.lasting),
                {keyframe.pose.data(), parameters_.camera.data(), parameters_.lens[0].data(),
                 parameters_.camera_time.data(), point.block.data()});
       if (!seen.has_right) continue;
       observation.px = term.at = seen.right_px;
       term.beam = 1;
-      add_term(term, new RightPixel(observation, cameras_, point.anchor), new ceres::HuberLoss(kPixelHuber),
+      add_term(term, new RightPixel(observation, cameras_, point.anchor),
+               new ceres::HuberLoss(kPixelHuber / noise_.lasting),
                {keyframe.pose.data(), parameters_.camera.data(), parameters_.stereo.data(), parameters_.lens[1].data(),
                 parameters_.camera_time.data(), point.block.data()});
     }

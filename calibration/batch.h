@@ -17,7 +17,8 @@ namespace ear::calibration {
 
 /// How exact the sensors are: first guesses, which the residuals of the first solution replace.
 struct Noise {
-  double pixel = 0.6;  ///< [px]
+  double pixel = 0.6;    ///< of features' residuals [px]
+  double lasting = 1.0;  ///< features count with so many times that: their errors last (information.h)
   RollNoise roll;
   double beam = 0.004;          ///< [m]
   double stand = 1e-3;          ///< [m] of the wheels' lowest points from the plane
@@ -56,6 +57,8 @@ class Batch {
   [[nodiscard]] bool solve(int iterations, int threads, const Progress& progress);
   /// Noise by the residuals of the present solution; features that do not fit are used no more.
   void learn_noise();
+  /// From the next build() on, features count with `lasting` times the noise that they count with now.
+  void weigh_pixels(double lasting) { noise_.lasting *= lasting; }
 
   [[nodiscard]] const std::vector<ParameterBlock>& parameter_blocks() const { return blocks_; }
   [[nodiscard]] const Parameters& parameters() const { return parameters_; }

@@ -7,9 +7,9 @@
 
 namespace ear::calibration {
 
-/// States over the gaps that are longer than `gap` and shorter than `longest` [s], `interval` apart. `states` begin anew
-/// after a gap, at rest on the ground, in a world of their own: they are moved to where the inertial samples lead, at
-/// the height at which the vehicle was before. What those samples then miss is spread over the gap. The last second
+/// States over the gaps that are longer than `gap` and shorter than `longest` [s], `interval` apart. `states` begin
+/// anew after a gap, at rest on the ground, in a world of their own: they are moved to where the inertial samples lead,
+/// at the height at which the vehicle was before. What those samples then miss is spread over the gap. The last second
 /// before a gap is not believed: an estimate that is lost was wrong before.
 [[nodiscard]] std::vector<GuessedState> bridge_gaps(const std::vector<GuessedState>& states,
                                                     const std::vector<ImuSample>& imu, double interval, double gap,

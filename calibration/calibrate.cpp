@@ -15,6 +15,7 @@ constexpr double kGate = 6.0;  // [sigma] of wheels and beams, once there is a s
 constexpr int kFirst = 12;     // iterations
 constexpr int kNext = 6;
 constexpr int kRounds = 3;
+constexpr double kLasting = 1.1;  // of the features' errors, from which on they are weighed anew
 constexpr double kLeftOut = 4.0;  // [s] of a drive: standing before the start
 constexpr double kLate = 5e-3;    // [s] of the cameras' clock: further, the body does not turn at an even rate
 
@@ -26,22 +27,27 @@ std::vector<Entry> all_entries(const std::vector<ParameterBlock>& blocks) {
   return entries;
 }
 
+/// To the minimum of what is built.
+void solve(Batch& batch, const Settings& settings, int iterations, const std::string& what) {
+  const auto told = [&](int iteration, double cost) {
+    if (!settings.progress) return;
+    settings.progress(what + ", step " + std::to_string(iteration) + ": " + std::to_string(cost));
+  };
+  if (!batch.solve(iterations, settings.threads, told)) {
+    throw std::runtime_error(
+        "no minimum found: the sensors contradict each other, or the calibration given is too "
+        "far off");
+  }
+}
+
 /// Returns the residuals before the first step.
 std::vector<Residual> minimise(Batch& batch, const Settings& settings) {
   std::vector<Residual> before;
   for (int round = 0; round < kRounds; ++round) {
     batch.build(round == 0 ? 0.0 : kGate);
     if (round == 0) before = residuals_of(batch);
-    const auto told = [&](int iteration, double cost) {
-      if (!settings.progress) return;
-      settings.progress("round " + std::to_string(round + 1) + " of " + std::to_string(kRounds) + ", step " +
-                        std::to_string(iteration) + ": " + std::to_string(cost));
-    };
-    if (!batch.solve(round == 0 ? kFirst : kNext, settings.threads, told)) {
-      throw std::runtime_error(
-          "no minimum found: the sensors contradict each other, or the calibration given is too "
-          "far off");
-    }
+    solve(batch, settings, round == 0 ? kFirst : kNext,
+          "round " + std::to_string(round + 1) + " of " + std::to_string(kRounds));
     if (round + 1 < kRounds) batch.learn_noise();
   }
   return before;
@@ -124,6 +130,23 @@ void find_entangled(const std::vector<Entry>& entries, const Eigen::MatrixXd& P,
   }
 }
 
+Information known(Batch& batch, const Settings& settings) {
+  if (settings.progress) settings.progress("covariance");
+  const std::optional<Information> information = information_of(batch, settings.threads);
+  if (!information) throw std::runtime_error("the covariance cannot be computed: the problem is singular");
+  return *information;
+}
+
+/// The covariance, where need be after features were given the weight that they deserve beside the other sensors.
+Eigen::MatrixXd weighed(Batch& batch, const Settings& settings) {
+  const Information first = known(batch, settings);
+  if (first.lasting < kLasting) return first.covariance;
+  batch.weigh_pixels(first.lasting);
+  batch.build(kGate);
+  solve(batch, settings, kNext, "weight of features");
+  return known(batch, settings).covariance;
+}
+
 }  // namespace
 
 Result calibrate(const Calibration& given, const Priors& priors, const std::vector<Drive>& drives,
@@ -131,17 +154,15 @@ Result calibrate(const Calibration& given, const Priors& priors, const std::vect
   if (drives.empty()) throw std::invalid_argument("no drive to calibrate from");
   const Passed passed = pass_until_whole(given, priors, drives, settings);
   Batch& batch = *passed.batch;
-  if (settings.progress) settings.progress("covariance");
-  const auto P = parameter_covariance(batch, settings.threads);
-  if (!P) throw std::runtime_error("the covariance cannot be computed: the problem is singular");
+  const Eigen::MatrixXd P = weighed(batch, settings);
 
   const std::vector<Entry> entries = all_entries(batch.parameter_blocks());
   std::vector<bool> shown;
   for (std::size_t i = 0; i < entries.size(); ++i) {
     const auto k = static_cast<Eigen::Index>(i);
-    shown.push_back(std::sqrt((*P)(k, k)) < settings.shown_below * entries[i].prior);
+    shown.push_back(std::sqrt(P(k, k)) < settings.shown_below * entries[i].prior);
   }
-  const Eigen::MatrixXd after = refuse(entries, shown, *P);
+  const Eigen::MatrixXd after = refuse(entries, shown, P);
 
   Result result;
   result.covariance = after;
@@ -161,7 +182,7 @@ Result calibrate(const Calibration& given, const Priors& priors, const std::vect
                     shown[i] ? "" : motion_that_shows(entry.name)};
     result.findings.push_back(finding);
   }
-  find_entangled(entries, *P, result.findings);
+  find_entangled(entries, P, result.findings);
   result.before = passed.before;
   result.after = residuals_of(batch);
   result.parameters = batch.parameters();

@@ -8,8 +8,16 @@
 
 namespace ear::calibration {
 
-/// Covariance of all parameters at the present values, in the order of Batch::parameter_blocks(), priors included.
-/// Nothing if the problem is singular.
-[[nodiscard]] std::optional<Eigen::MatrixXd> parameter_covariance(Batch& batch, int threads);
+/// What is known of all parameters at the present values, in the order of Batch::parameter_blocks(), priors included.
+struct Information {
+  /// Errors of a feature's sightings are taken as they are found: of any size, and alike over its whole track.
+  Eigen::MatrixXd covariance;
+  /// How much larger the features make a standard deviation than errors would that are white and of the noise assumed:
+  /// root of the mean over the parameters, as far as features show them. 1 where there are none.
+  double lasting = 1.0;
+};
+
+/// docs/calibration.md has the derivation. Nothing if the problem is singular.
+[[nodiscard]] std::optional<Information> information_of(Batch& batch, int threads);
 
 }  // namespace ear::calibration

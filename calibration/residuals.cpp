@@ -19,7 +19,7 @@ std::vector<Residual> residuals_of(const Batch& batch) {
     residual.t = seconds_between(batch.segments()[term.segment].keyframes.front().t_ns, term.t_ns);
     residual.at = term.at;
     residual.value = {whitened[0], term.kind == Term::beam ? 0.0 : whitened[1]};
-    if (term.kind == Term::pixel) residual.value *= batch.noise().pixel;
+    if (term.kind == Term::pixel) residual.value *= batch.noise().pixel * batch.noise().lasting;
     residuals.push_back(residual);
   }
   return residuals;

@@ -1,5 +1,5 @@
-// A vehicle of an independent physics: what `ear calibrate` makes of wheels, IMU and beams that this project's simulator
-// has no part in. The vehicle is vehicle.xml; here is who drives it.
+// A vehicle of an independent physics: what `ear calibrate` makes of wheels, IMU and beams that this project's
+// simulator has no part in. The vehicle is vehicle.xml; here is who drives it.
 #include <mujoco/mujoco.h>
 
 #include <array>
@@ -23,10 +23,10 @@ constexpr std::array kBeams{"front_left", "front_right", "rear"};
 
 /// What the vehicle is to do for a while.
 struct Leg {
-  double duration = 1.0;                              ///< [s]
-  double speed = 0.0, rate = 0.0;                     ///< at its end [m/s], [rad/s]
-  double pitch = 0.0, roll = 0.0, frequency = 0.0;    ///< amplitudes [rad] and [Hz]; the roll in the air only
-  double height = 0.0;                                ///< of the hop that the leg is [m]
+  double duration = 1.0;                            ///< [s]
+  double speed = 0.0, rate = 0.0;                   ///< at its end [m/s], [rad/s]
+  double pitch = 0.0, roll = 0.0, frequency = 0.0;  ///< amplitudes [rad] and [Hz]; the roll in the air only
+  double height = 0.0;                              ///< of the hop that the leg is [m]
 };
 
 /// The recommended drive, for a vehicle that hops for seconds only: nothing shows it where it is while it flies.
@@ -247,8 +247,8 @@ TEST_CASE("calibrate: wheels and beams of a vehicle of another physics") {
     }
   }
   MESSAGE("mean squared normalized error: " << squares / count);
-  CHECK(squares / count < 2.0);    // of 25, correlated
-  CHECK(result.left_out < 5.0);    // the hops are in it
+  CHECK(squares / count < 2.0);  // of 25, correlated
+  CHECK(result.left_out < 5.0);  // the hops are in it
   CHECK(result.findings.size() == 25);
   const EncoderCalibration& encoder = *result.calibration.encoder;
   for (std::size_t side = 0; side < 2; ++side) {

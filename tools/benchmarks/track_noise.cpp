@@ -76,7 +76,8 @@ std::vector<Track> tracks_of(const simulator::Simulation& simulation, const cali
         const auto hit = simulation.scene().cast(T_WC[0].translation(), direction_W);
         if (!hit) continue;
         const Eigen::Vector3d p_W = T_WC[0].translation() + hit->range * direction_W;
-        found = begun.emplace(feature.id, Begun{frame.t_ns, p_W, hit->panel == simulator::kGround, tracks.size()}).first;
+        found =
+            begun.emplace(feature.id, Begun{frame.t_ns, p_W, hit->panel == simulator::kGround, tracks.size()}).first;
         tracks.emplace_back();
       }
       if (moving && !moves) continue;
@@ -114,13 +115,12 @@ struct Component {
 const std::array<Component, 5> kComponents{{
     {"left u", [](const Sighting& s) -> std::optional<double> { return s.left.x(); }},
     {"left v", [](const Sighting& s) -> std::optional<double> { return s.left.y(); }},
-    {"right u", [](const Sighting& s) -> std::optional<double> {
-       return s.right ? std::optional(s.right->x()) : std::nullopt;
-     }},
-    {"right v", [](const Sighting& s) -> std::optional<double> {
-       return s.right ? std::optional(s.right->y()) : std::nullopt;
-     }},
-    {"disparity", [](const Sighting& s) -> std::optional<double> {
+    {"right u",
+     [](const Sighting& s) -> std::optional<double> { return s.right ? std::optional(s.right->x()) : std::nullopt; }},
+    {"right v",
+     [](const Sighting& s) -> std::optional<double> { return s.right ? std::optional(s.right->y()) : std::nullopt; }},
+    {"disparity",
+     [](const Sighting& s) -> std::optional<double> {
        return s.right ? std::optional(s.left.x() - s.right->x()) : std::nullopt;
      }},
 }};
