@@ -21,6 +21,9 @@ constexpr double kTurns = 0.02;          // [rad/s] of a window's mean from the 
 constexpr double kTilts = 0.2;           // [m/s^2]
 constexpr double kShakes = 2.0;          // times the spread of the quietest window
 constexpr double kFirstTau = 0.02;       // [s] below, filters and digits of the sensor show
+constexpr double kJitterTime = 0.01;     // [s] means that jitter is told from
+constexpr double kMoves = 2.0;           // times the jitter at rest: what a gyroscope spreads over a moving half second
+constexpr double kLeastMotion = 3.0;     // [s]
 
 double squared(double x) { return x * x; }
 
@@ -122,6 +125,30 @@ double median_interval(const std::vector<ImuSample>& imu) {
   return upper_median(intervals);
 }
 
+double component(const ImuSample& sample, std::size_t axis) {
+  const auto k = static_cast<Eigen::Index>(axis);
+  return axis < 3 ? sample.gyro_B(k) : sample.accel_B(k - 3);
+}
+
+/// Of white noise, the fourth difference of means has 70 times their variance; of a motion of 5 Hz, a thousandth.
+double jitter_of(const std::vector<ImuSample>& imu, std::size_t from, std::size_t to, std::size_t axis,
+                 double interval) {
+  const auto m = std::max<std::size_t>(1, static_cast<std::size_t>(std::lround(kJitterTime / interval)));
+  std::vector<double> means;
+  for (std::size_t i = from; i + m <= to; i += m) {
+    double sum = 0.0;
+    for (std::size_t k = i; k < i + m; ++k) sum += component(imu[k], axis);
+    means.push_back(sum / static_cast<double>(m));
+  }
+  double sum = 0.0, count = 0.0;
+  for (std::size_t i = 0; i + 4 < means.size(); ++i) {
+    sum += squared(means[i] - 4.0 * means[i + 1] + 6.0 * means[i + 2] - 4.0 * means[i + 3] + means[i + 4]);
+    count += 1.0;
+  }
+  constexpr double kOfFourth = 70.0;
+  return count > 0.0 ? std::sqrt(sum / count / kOfFourth * static_cast<double>(m) * interval) : 0.0;
+}
+
 }  // namespace
 
 AllanResult allan(const std::vector<double>& signal, double interval) {
@@ -154,9 +181,39 @@ ImuNoise noise_at_rest(const std::vector<ImuSample>& imu) {
   std::vector<double> signal(to - from);
   for (int axis = 0; axis < 6; ++axis) {
     for (std::size_t i = from; i < to; ++i) {
-      signal[i - from] = axis < 3 ? imu[i].gyro_B(axis) : imu[i].accel_B(axis - 3);
+      signal[i - from] = component(imu[i], static_cast<std::size_t>(axis));
     }
     result.axes.push_back(allan(signal, interval));
+    result.jitter[static_cast<std::size_t>(axis)] = jitter_of(imu, from, to, static_cast<std::size_t>(axis), interval);
+  }
+  return result;
+}
+
+MotionNoise noise_in_motion(const ImuNoise& rest, const std::vector<ImuSample>& imu) {
+  const double interval = imu.size() < 100 ? 0.0 : median_interval(imu);
+  if (!(std::abs(interval * rest.rate_hz - 1.0) < 0.1)) {
+    throw std::invalid_argument("noise in motion: samples at another rate than at rest, or hardly any");
+  }
+  const auto size = static_cast<std::size_t>(std::lround(kWindow / interval));
+  const double turns = std::sqrt(squared(rest.jitter[0]) + squared(rest.jitter[1]) + squared(rest.jitter[2]));
+  std::array<std::vector<double>, 6> jitter;
+  for (std::size_t i = 0; i + size <= imu.size(); i += size) {
+    if (window_of(imu, i, size).gyro_spread < kMoves * turns / std::sqrt(interval)) continue;
+    for (std::size_t axis = 0; axis < 6; ++axis) jitter[axis].push_back(jitter_of(imu, i, i + size, axis, interval));
+  }
+  MotionNoise result;
+  result.duration = static_cast<double>(jitter[0].size() * size) * interval;
+  if (result.duration < kLeastMotion) {
+    throw std::invalid_argument("it moves for " + std::to_string(result.duration) + " s; 3 s are needed");
+  }
+  for (std::size_t axis = 0; axis < 6; ++axis) {
+    std::vector<double>& values = jitter[axis];
+    const double middle = upper_median(values);
+    std::vector<double> apart;
+    for (const double value : values) apart.push_back(std::abs(value - middle));
+    constexpr double kOfMedian = 1.4826 * 1.2533;  // spread of single ones from median to sigma; of their median
+    const double sigma = kOfMedian * upper_median(apart) / std::sqrt(static_cast<double>(values.size()));
+    result.times[axis] = {middle / rest.jitter[axis], sigma / rest.jitter[axis]};
   }
   return result;
 }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <optional>
 #include <vector>
 
@@ -38,9 +39,21 @@ struct ImuNoise {
   double duration = 0.0;  ///< [s] of that stretch
   double rate_hz = 0.0;
   std::vector<AllanResult> axes;
+  /// What the samples jitter by from one 10 ms to the next, as a density [unit/sqrt(Hz)]: no motion is as fast.
+  std::array<double, 6> jitter{};
 };
 
 /// Throws std::invalid_argument where it does not stand for 2 s at least.
 [[nodiscard]] ImuNoise noise_at_rest(const std::vector<ImuSample>& imu);
+
+/// How many times as much each axis jitters in motion as at rest: what rotors and wheels add.
+struct MotionNoise {
+  double duration = 0.0;  ///< [s] in motion
+  std::array<Measured, 6> times;
+};
+
+/// By the half seconds in which the body turns or shakes; the median of them, so that strikes do not count. Throws
+/// std::invalid_argument where there are not 3 s of motion, or where the samples come at another rate than at rest.
+[[nodiscard]] MotionNoise noise_in_motion(const ImuNoise& rest, const std::vector<ImuSample>& imu);
 
 }  // namespace ear::calibration

@@ -39,6 +39,7 @@ struct CalibrateArguments {
   std::vector<fs::path> reference;
   double reference_sigma = 1.0;
   fs::path imu;
+  fs::path moving;
   fs::path report;
   bool plan = false;
   int threads = 2;
@@ -114,8 +115,8 @@ void calibrate_drives(const CalibrateArguments& args) {
   std::printf("%s%.1f s: %s\n", text.c_str(), taken.count(), args.out.c_str());
 }
 
-void calibrate_imu(const CalibrateArguments& args) {
-  const OpenedRecording opened(args.imu, args.config);
+std::vector<ImuSample> read_imu(const fs::path& path, const CalibrateArguments& args) {
+  const OpenedRecording opened(path, args.config);
   RecordingOptions options;
   options.accept_bad_calibration = true;
   Recording recording = opened.read(options);
@@ -123,10 +124,20 @@ void calibrate_imu(const CalibrateArguments& args) {
   while (const std::optional<Sample> sample = recording.next()) {
     if (const auto* inertial = std::get_if<ImuSample>(&*sample)) imu.push_back(*inertial);
   }
-  const calibration::ImuNoise noise = calibration::noise_at_rest(imu);
+  return imu;
+}
+
+void calibrate_imu(const CalibrateArguments& args) {
+  const calibration::ImuNoise noise = calibration::noise_at_rest(read_imu(args.imu, args));
+  std::string text = calibration::to_text(noise);
+  std::optional<calibration::MotionNoise> motion;
+  if (!args.moving.empty()) {
+    motion = calibration::noise_in_motion(noise, read_imu(args.moving, args));
+    text += calibration::to_text(*motion);
+  }
   fs::create_directories(args.out);
-  write_text(args.out / "imu_noise.json", calibration::to_json(noise));
-  std::printf("%s%s\n", calibration::to_text(noise).c_str(), (args.out / "imu_noise.json").c_str());
+  write_text(args.out / "imu_noise.json", calibration::to_json(noise, motion));
+  std::printf("%s%s\n", text.c_str(), (args.out / "imu_noise.json").c_str());
 }
 
 void calibrate(const CalibrateArguments& args) {
@@ -138,6 +149,7 @@ void calibrate(const CalibrateArguments& args) {
     calibrate_imu(args);
     return;
   }
+  if (!args.moving.empty()) throw InputError("--moving: noise in motion is told against that at rest, --imu");
   if (args.recordings.empty()) throw InputError("ear calibrate: a RECORDING is needed, or --imu, or --plan");
   calibrate_drives(args);
 }
@@ -160,6 +172,8 @@ void add_calibrate_command(CLI::App& app) {
       ->capture_default_str();
   command->add_option("--report", args->report, "HTML page: residuals before and after, hits of beams");
   command->add_option("--imu", args->imu, "A recording at rest: the noise of the IMU, and nothing else");
+  command->add_option("--moving", args->moving,
+                      "With --imu: a hover or a drive; how much noisier the IMU is in motion");
   command->add_flag("--plan", args->plan, "Print the drive to make");
   command->add_option("--threads", args->threads, "For the batch estimate")
       ->check(CLI::PositiveNumber)

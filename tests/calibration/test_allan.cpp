@@ -74,3 +74,48 @@ TEST_CASE("allan: the stretch at rest is the one that neither moves nor shakes")
   imu.resize(120);
   CHECK_THROWS_WITH(static_cast<void>(noise_at_rest(imu)), doctest::Contains("s at most"));
 }
+
+namespace {
+
+/// Swings of 2 Hz and 1 rad/s after 5 s of rest; in motion the noise is so many times as large.
+std::vector<ImuSample> swinging(unsigned seed, double gyro_times, double accel_times, double moving) {
+  std::mt19937_64 rng{seed};
+  std::normal_distribution<double> normal;
+  std::vector<ImuSample> imu;
+  for (int i = 0; i < static_cast<int>(200.0 * (5.0 + moving)); ++i) {
+    const double t = i / 200.0 - 5.0;
+    ImuSample sample{i * 5'000'000LL, Eigen::Vector3d::Zero(), {0.0, 0.0, 9.81}};
+    const double swing = t > 0.0 ? std::sin(12.6 * t) : 0.0;
+    for (int axis = 0; axis < 3; ++axis) {
+      sample.gyro_B(axis) += 0.014 * (t > 0.0 ? gyro_times : 1.0) * normal(rng) + (axis == 1 ? swing : 0.0);
+      sample.accel_B(axis) += 0.14 * (t > 0.0 ? accel_times : 1.0) * normal(rng) + (axis == 0 ? 2.0 * swing : 0.0);
+    }
+    imu.push_back(sample);
+  }
+  return imu;
+}
+
+}  // namespace
+
+TEST_CASE("noise in motion: what rotors add is told from the motion itself") {
+  for (const double times : {1.0, 3.0}) {
+    CAPTURE(times);
+    const std::vector<ImuSample> imu = swinging(4, times, 2.0 * times, 10.0);
+    const MotionNoise found = noise_in_motion(noise_at_rest(imu), imu);
+    CHECK(found.duration == doctest::Approx(10.0).epsilon(0.06));
+    for (std::size_t axis = 0; axis < 6; ++axis) {
+      CAPTURE(axis);
+      CHECK(found.times[axis].value == doctest::Approx(axis < 3 ? times : 2.0 * times).epsilon(0.15));
+      CHECK(found.times[axis].sigma < 0.1 * found.times[axis].value);
+    }
+  }
+}
+
+TEST_CASE("noise in motion: no motion, and another rate, are errors in words") {
+  const std::vector<ImuSample> imu = swinging(5, 1.0, 1.0, 0.5);
+  const ImuNoise rest = noise_at_rest(imu);
+  CHECK_THROWS_WITH(static_cast<void>(noise_in_motion(rest, imu)), doctest::Contains("3 s are needed"));
+  std::vector<ImuSample> slow;
+  for (std::size_t i = 0; i < imu.size(); i += 2) slow.push_back(imu[i]);
+  CHECK_THROWS_WITH(static_cast<void>(noise_in_motion(rest, slow)), doctest::Contains("another rate"));
+}

@@ -114,7 +114,21 @@ std::string to_text(const ImuNoise& noise) {
   return text;
 }
 
-std::string to_json(const ImuNoise& noise) {
+std::string to_text(const MotionNoise& motion) {
+  std::string text = line("%.1f s in motion; noise, times that at rest:\n", motion.duration);
+  for (std::size_t axis = 0; axis < motion.times.size(); ++axis) {
+    text += line("%-16s %.2f +- %.1g\n", axis_name(axis), motion.times[axis].value, motion.times[axis].sigma);
+  }
+  const auto factor = [&](std::size_t first) {
+    double sum = 0.0;
+    for (std::size_t axis = first; axis < first + 3; ++axis) sum += motion.times[axis].value * motion.times[axis].value;
+    return std::sqrt(sum / 3.0);
+  };
+  return text +
+         line("factor for gyroscope_noise_density %.2f, for accelerometer_noise_density %.2f\n", factor(0), factor(3));
+}
+
+std::string to_json(const ImuNoise& noise, const std::optional<MotionNoise>& motion) {
   const auto measured = [](const std::optional<Measured>& value) {
     return value ? Json{{"value", value->value}, {"sigma", value->sigma}} : Json(nullptr);
   };
@@ -128,7 +142,12 @@ std::string to_json(const ImuNoise& noise) {
                     {"random_walk", measured(found.random_walk)},
                     {"tau_deviation_relative_sigma", points}});
   }
-  const Json json{{"duration_s", noise.duration}, {"rate_hz", noise.rate_hz}, {"axes", axes}};
+  Json json{{"duration_s", noise.duration}, {"rate_hz", noise.rate_hz}, {"axes", axes}};
+  if (motion) {
+    Json times = Json::array();
+    for (const Measured& value : motion->times) times.push_back({{"value", value.value}, {"sigma", value.sigma}});
+    json["in_motion"] = {{"duration_s", motion->duration}, {"noise_over_noise_at_rest", times}};
+  }
   return json.dump(1) + "\n";
 }
 

@@ -1,6 +1,7 @@
 // What a calibration found, for people and for programs.
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "calibration/allan.h"
@@ -15,6 +16,8 @@ namespace ear::calibration {
 
 /// White noise and random walk of each axis with their uncertainty, and the lines for imu0/sensor.yaml.
 [[nodiscard]] std::string to_text(const ImuNoise& noise);
-[[nodiscard]] std::string to_json(const ImuNoise& noise);
+[[nodiscard]] std::string to_json(const ImuNoise& noise, const std::optional<MotionNoise>& motion = {});
+/// How much each axis jitters more in motion, and the factor for the noise of each sensor.
+[[nodiscard]] std::string to_text(const MotionNoise& motion);
 
 }  // namespace ear::calibration

@@ -332,7 +332,7 @@ Sequence sway3() {
 
 // What shows every part of the calibration: `ear calibrate --plan`.
 Sequence calibrate() {
-  // From side to side in a second: the body tilts by 15 to 20 degrees, and its acceleration is well above the noise.
+  // From side to side in a second: the body tilts by 20 to 25 degrees, and its acceleration is well above the noise.
   const auto aside = [](double left) { return in_air(drift(stand(1.0), left)); };
   const auto ahead = [](double forward) {
     Leg leg = in_air(stand(1.0));
@@ -342,19 +342,19 @@ Sequence calibrate() {
   std::vector<Leg> legs;
   const auto add = [&legs](std::initializer_list<Leg> more) { legs.insert(legs.end(), more); };
   const auto shake = [&](int sideways, int lengthways) {
-    for (int i = 0; i < sideways; ++i) add({aside(0.9), aside(-0.9)});
-    for (int i = 0; i < lengthways; ++i) add({ahead(0.9), ahead(-0.9)});
+    for (int i = 0; i < sideways; ++i) add({aside(1.2), aside(-1.2)});
+    for (int i = 0; i < lengthways; ++i) add({ahead(1.2), ahead(-1.2)});
   };
   add({stand(3.0), sway(10.0, 10.0), spin(400, 1.0), stand(0.5), spin(-400, 1.0), stand(0.5)});
   add({turn(0.9, 360, 0.8), turn(0.9, -360, 0.8), turn(0.9, 360, 0.9), turn(0.9, -360, 0.9), stand(1.0)});
   add({drive(4.0, 1.0), stand(0.6), reverse(4.0, 1.0), stand(1.0)});
   add({take_off(0.6, 1.5)});  // low and high: a beam's origin is told from its direction
-  shake(6, 0);
+  shake(7, 0);
   add({stand(0.8), land(0.6), stand(1.5), sway(6.0, 10.0)});
   add({take_off(2.2, 3.0)});
-  shake(8, 6);
+  shake(9, 7);
   add({in_air(spin(90, 0.9))});
-  shake(7, 0);
+  shake(8, 0);
   add({in_air(spin(-90, 0.9)), stand(0.8), land(2.2), stand(1.5)});
   add({spin(90, 0.9), drive(2.0, 1.0), stand(0.6), reverse(2.0, 0.8), stand(3.0)});
   return {
