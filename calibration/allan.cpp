@@ -206,6 +206,8 @@ MotionNoise noise_in_motion(const ImuNoise& rest, const std::vector<ImuSample>& 
   if (result.duration < kLeastMotion) {
     throw std::invalid_argument("it moves for " + std::to_string(result.duration) + " s; 3 s are needed");
   }
+  // Relative, of the jitter at rest: 1 + 2 (0.8^2 + 0.4^2 + 0.11^2) of two fourth differences are not independent.
+  const double at_rest = std::sqrt(2.63 / 2.0 * kJitterTime / rest.duration);
   for (std::size_t axis = 0; axis < 6; ++axis) {
     std::vector<double>& values = jitter[axis];
     const double middle = upper_median(values);
@@ -213,7 +215,8 @@ MotionNoise noise_in_motion(const ImuNoise& rest, const std::vector<ImuSample>& 
     for (const double value : values) apart.push_back(std::abs(value - middle));
     constexpr double kOfMedian = 1.4826 * 1.2533;  // spread of single ones from median to sigma; of their median
     const double sigma = kOfMedian * upper_median(apart) / std::sqrt(static_cast<double>(values.size()));
-    result.times[axis] = {middle / rest.jitter[axis], sigma / rest.jitter[axis]};
+    const double times = middle / rest.jitter[axis];
+    result.times[axis] = {times, std::hypot(sigma / rest.jitter[axis], at_rest * times)};
   }
   return result;
 }

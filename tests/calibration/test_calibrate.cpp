@@ -1,6 +1,8 @@
 // Simulated vehicles with a calibration five times as wrong as those of real rigs, on feature tracks.
 #include <cmath>
+#include <random>
 #include <string>
+#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -44,7 +46,8 @@ TEST_CASE("calibrate: the recommended drive shows everything, and errors are as 
     squares += std::pow(made.errors[i] / found.posterior, 2) / static_cast<double>(made.errors.size());
   }
   MESSAGE("mean squared normalized error: " << squares);
-  CHECK(squares < 2.0);  // of 48, correlated: 0.5 to 1.6 over ten vehicles
+  CHECK(squares < 2.0);                     // of 48, correlated: 0.5 to 1.6 over ten vehicles
+  CHECK(made.result.noise.lasting == 1.0);  // the errors of these tracks are white
   CHECK(finding(made, "encoder0: wheel radius, mean").posterior < 0.0012 * 75.0);
   CHECK(made.result.calibration.encoder->wheel_radius_sigma.has_value());
 }
@@ -134,6 +137,48 @@ TEST_CASE("calibrate: on a flat floor wheels show, and the beams' directions do 
               35.0,
               {{"tilt", "hover"}, {"origin y", "hover"}},
               {"wheel radius", "wheel separation", "position of the axle x", "axle turned", "cam0: rotation"}});
+}
+
+TEST_CASE("calibrate: errors that last as long as a track are told from the residuals, and make features count less") {
+  simulator::Options options;
+  options.sequence = "flat1";
+  options.seed = 41;
+  options.camera_rate_hz = 10.0;
+  options.duration = 35.0;
+  options.calibration_error = 5.0;
+  options.track.sigma_px = 0.1;
+  const simulator::Simulation simulation(options);
+  const Calibration& given = simulation.calibration();
+  const Priors priors = drawn_priors(5.0);
+  Drive drive = recorded_drive(simulation, given);
+  // Half of the tracks drift: a walk of 0.1 px from frame to frame, the same in both cameras.
+  std::mt19937_64 rng{5};
+  std::normal_distribution<double> step(0.0, 0.1 / given.cameras[0].fu);
+  std::unordered_map<std::uint64_t, Eigen::Vector2d> drifts;
+  for (FeatureFrame& frame : drive.frames) {
+    for (FeatureObservation& feature : frame.features) {
+      if (feature.id % 2 == 0) continue;
+      Eigen::Vector2d& drift = drifts.emplace(feature.id, Eigen::Vector2d::Zero()).first->second;
+      drift += Eigen::Vector2d(step(rng), step(rng));
+      feature.left += drift;
+      feature.right += drift;
+    }
+  }
+  const Result result = calibrate(given, priors, {drive}, Settings{});
+  Parameters truth = errors_of(given, simulation.true_calibration());
+  double squares = 0.0, count = 0.0;
+  std::size_t i = 0;
+  for (const ParameterBlock& block : blocks_of(truth, given, priors)) {
+    for (const Entry& entry : block.entries) {
+      const Finding& found = result.findings[i++];
+      if (!found.shown) continue;
+      squares += std::pow((entry.scale * *entry.value - found.change) / found.posterior, 2);
+      count += 1.0;
+    }
+  }
+  MESSAGE("errors that last: " << result.noise.lasting << " times, mean squared normalized error " << squares / count);
+  CHECK(result.noise.lasting > 1.4);
+  CHECK(squares / count < 2.0);
 }
 
 TEST_CASE("calibrate: no estimate is an error in words") {
