@@ -43,6 +43,18 @@ Priors drawn_priors(double factor) {
   return priors;
 }
 
+std::vector<double> errors_left(const Result& result, const Calibration& given, const Calibration& truth,
+                                const Priors& priors) {
+  std::vector<double> errors;
+  Parameters parameters = errors_of(given, truth);
+  for (const ParameterBlock& block : blocks_of(parameters, given, priors)) {
+    for (const Entry& entry : block.entries) {
+      errors.push_back(entry.scale * *entry.value - result.findings[errors.size()].change);
+    }
+  }
+  return errors;
+}
+
 Drive recorded_drive(const simulator::Simulation& simulation, const Calibration& given) {
   Drive drive;
   drive.name = simulation.options().sequence;
@@ -64,14 +76,7 @@ SimulatedCalibration calibrate_simulated(const simulator::Simulation& simulation
   const std::vector<Drive> drives{recorded_drive(simulation, given)};
   SimulatedCalibration made;
   made.result = calibrate(given, priors, drives, settings);
-  Parameters truth = errors_of(given, simulation.true_calibration());
-  const std::vector<ParameterBlock> blocks = blocks_of(truth, given, priors);
-  std::size_t i = 0;
-  for (const ParameterBlock& block : blocks) {
-    for (const Entry& entry : block.entries) {
-      made.errors.push_back(entry.scale * *entry.value - made.result.findings[i++].change);
-    }
-  }
+  made.errors = errors_left(made.result, given, simulation.true_calibration(), priors);
   return made;
 }
 

@@ -16,6 +16,10 @@ struct SimulatedCalibration {
   std::vector<double> errors;  ///< true less calibrated, of each finding in its unit
 };
 
+/// True less calibrated, of each finding in its unit. `given` and `priors`: what `result` was found from.
+[[nodiscard]] std::vector<double> errors_left(const Result& result, const Calibration& given, const Calibration& truth,
+                                              const Priors& priors);
+
 /// The simulation's samples and tracks, the latter through its true lens and that of `given`.
 [[nodiscard]] Drive recorded_drive(const simulator::Simulation& simulation, const Calibration& given);
 
