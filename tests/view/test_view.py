@@ -13,12 +13,14 @@ import shutil
 import socket
 import subprocess
 import sys
-import tempfile
 import threading
 import time
 import unittest
 import urllib.request
 from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "support"))
+from temporary_folder import InTemporaryFolder
 
 PROGRAM = Path(sys.argv.pop(1)).resolve()
 SCRATCH = Path(sys.argv.pop(1)).resolve()
@@ -59,19 +61,18 @@ def reader(run, name, stop):
         time.sleep(0.1)
 
 
-class SimulatedRecording(unittest.TestCase):
+class SimulatedRecording(InTemporaryFolder):
     @classmethod
     def setUpClass(cls):
-        cls.folder = tempfile.TemporaryDirectory()
-        cls.addClassCleanup(cls.folder.cleanup)
-        cls.recording = Path(cls.folder.name) / "flight"
+        super().setUpClass()
+        cls.recording = cls.work / "flight"
         subprocess.run([*map(str, [PROGRAM, "simulate", *SIMULATED, "--out", cls.recording])], capture_output=True, check=True)
 
 
 class Viewers(SimulatedRecording):
     def run_with(self, viewers):
         """The bytes of the run's files with so many viewers, of which the last one never reads."""
-        out = Path(self.folder.name) / f"with-{viewers}"
+        out = self.work / f"with-{viewers}"
         run = Run(self.recording, out, "--real-time")
         stop = threading.Event()
         threads = [threading.Thread(target=reader, args=(run, f"v{i}", stop)) for i in range(viewers - (viewers > 1))]
@@ -89,8 +90,8 @@ class Viewers(SimulatedRecording):
         return {name: (out / name).read_bytes() for name in ("estimate.tum", "states.csv")}, counts
 
     def test_no_estimate_changes(self):
-        subprocess.run([PROGRAM, "run", self.recording, "--out", Path(self.folder.name) / "without"], capture_output=True, check=True)
-        without = {name: (Path(self.folder.name) / "without" / name).read_bytes() for name in ("estimate.tum", "states.csv")}
+        subprocess.run([PROGRAM, "run", self.recording, "--out", self.work / "without"], capture_output=True, check=True)
+        without = {name: (self.work / "without" / name).read_bytes() for name in ("estimate.tum", "states.csv")}
         self.assertGreater(len(without["states.csv"]), 50_000)
         for viewers in (0, 1, 8):
             with self.subTest(viewers=viewers):
@@ -107,7 +108,7 @@ class Viewers(SimulatedRecording):
 
 class Options(SimulatedRecording):
     def refused(self, *options):
-        command = [PROGRAM, "run", self.recording, "--out", Path(self.folder.name) / "refused", *options]
+        command = [PROGRAM, "run", self.recording, "--out", self.work / "refused", *options]
         done = subprocess.run([*map(str, command)], capture_output=True, text=True, check=False)
         self.assertNotEqual(done.returncode, 0)
         return done.stderr
@@ -121,7 +122,7 @@ class Options(SimulatedRecording):
             self.assertIn(f"view: cannot listen on 127.0.0.1:{port}", self.refused("--view", port))
 
     def test_token(self):
-        run = Run(self.recording, Path(self.folder.name) / "token", "--view-token", "correct-horse-9", "--view-hold", 3)
+        run = Run(self.recording, self.work / "token", "--view-token", "correct-horse-9", "--view-hold", 3)
         self.assertTrue(run.url.endswith("?token=correct-horse-9"))
         with urllib.request.urlopen(run.url, timeout=5) as answer:
             self.assertEqual(answer.status, 200)
@@ -154,7 +155,7 @@ class Browser(SimulatedRecording):
         environment, reason = browser_or_reason()
         if environment is None:
             self.skipTest(reason)
-        out = Path(self.folder.name) / "seen"
+        out = self.work / "seen"
         run = Run(self.recording, out, "--real-time", "--view-hold", 15)
         done = subprocess.run(["node", "look.mjs", run.url, SCRATCH, "13"], cwd=SCRATCH, env=environment, capture_output=True,
                               text=True, check=False)
@@ -201,7 +202,11 @@ class Browser(SimulatedRecording):
         for canvas in ("above", "perspective"):  # ground, flight, truth, beams, ellipse
             for name, count in seen["pixels"][canvas].items():
                 self.assertGreater(count, 15, f"{name} of {canvas}")
-        self.assertGreater(seen["pixels"]["camera"], 500)
+        self.assertGreater(seen["pixels"]["sky"], 100)  # features not tested yet,
+        self.assertGreater(seen["pixels"]["yellow"], 100)  # those that updated the filter,
+        self.assertGreater(seen["pixels"]["age"], 50)  # and the colours of the age, on request
+        self.assertGreater(seen["uses"][0], 10)
+        self.assertGreater(seen["uses"][1], 10)
         self.assertGreater(seen["pixels"]["error"], 50)
         self.assertLessEqual(seen["overflow"], 0, "a telephone's screen is wide enough")
         self.assertTrue((SCRATCH / "wide.png").stat().st_size > 30_000 and (SCRATCH / "narrow.png").stat().st_size > 20_000)
