@@ -65,8 +65,9 @@ ImageView view_of_rows(const std::vector<std::uint8_t>& rows, const CameraCalibr
 }  // namespace
 
 QueuedOdometry::QueuedOdometry(const Config& config, const Calibration& calibration, const QueueCapacity& capacity,
-                               Clock clock)
-    : odometry_(config, checked(calibration, capacity), std::move(clock)),
+                               Clock clock, MakeEstimator make)
+    : odometry_(make ? OdometryFactory::make(config, checked(calibration, capacity), std::move(make), std::move(clock))
+                     : Odometry(config, checked(calibration, capacity), std::move(clock))),
       drops_frames_(config.performance.budget_ms > 0.0),
       cameras_(calibration.cameras),
       camera_offset_ns_(std::llround(1e9 * calibration.camera_time_offset)),
@@ -184,6 +185,11 @@ Progress QueuedOdometry::process(std::optional<Estimate>& estimate) {
 std::optional<TimeNs> QueuedOdometry::next_frame_ns() const {
   const Frame* const frame = frames_.queue.front();
   return frame == nullptr ? std::nullopt : std::optional(imu_time(frame->t_ns));
+}
+
+std::optional<StereoFrame> QueuedOdometry::next_frame() const {
+  const Frame* const frame = frames_.queue.front();
+  return frame == nullptr ? std::nullopt : std::optional(view_of(*frame));
 }
 
 std::optional<Estimate> QueuedOdometry::step(TimeNs t_ns) {

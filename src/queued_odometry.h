@@ -12,6 +12,7 @@
 #include "filter/ingest/stamp_guard.h"
 #include "src/live_state.h"
 #include "src/log/repeat_limit.h"
+#include "src/odometry_factory.h"
 #include "src/sample_queue.h"
 
 namespace ear {
@@ -45,8 +46,9 @@ class QueuedOdometry {
     std::array<double, kMaxBeams> range{};
   };
 
-  /// Throws std::invalid_argument, naming the field. `clock` as for Odometry.
-  QueuedOdometry(const Config& config, const Calibration& calibration, const QueueCapacity& capacity, Clock clock = {});
+  /// Throws std::invalid_argument, naming the field. `clock` as for Odometry; `make`: in place of the filter.
+  QueuedOdometry(const Config& config, const Calibration& calibration, const QueueCapacity& capacity, Clock clock = {},
+                 MakeEstimator make = {});
 
   /// Each by one thread. False: the queue is full; the sample is counted.
   bool add_imu(const ImuSample& sample) {
@@ -68,6 +70,8 @@ class QueuedOdometry {
   Progress process(std::optional<Estimate>& estimate);
   /// The time of the oldest frame that waits (IMU time), or nothing.
   [[nodiscard]] std::optional<TimeNs> next_frame_ns() const;
+  /// That frame as it came; its images are gone after process().
+  [[nodiscard]] std::optional<StereoFrame> next_frame() const;
   void start_at(const GivenStart& start) { odometry_.start_at(start); }
   std::optional<Estimate> step(TimeNs t_ns);
   void reset();

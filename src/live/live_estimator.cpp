@@ -30,8 +30,8 @@ std::size_t sample_slots(const Calibration& calibration, const QueueCapacity& ca
 }  // namespace
 
 LiveEstimator::LiveEstimator(const Config& config, const Calibration& calibration, const QueueCapacity& capacity,
-                             LiveListeners listeners)
-    : queued_(config, calibration, capacity),
+                             LiveListeners listeners, MakeEstimator make)
+    : queued_(config, calibration, capacity, {}, std::move(make)),
       samples_(sample_slots(calibration, capacity), {}),
       listeners_(std::move(listeners)),
       steps_(!calibration.cameras.empty(), calibration.encoder.has_value()),
@@ -133,6 +133,7 @@ bool LiveEstimator::take_frame(TimeNs frame_ns) {
     if (*waited_ < kPatience) return false;
     ++impatient_;
   }
+  if (listeners_.on_images) listeners_.on_images(*queued_.next_frame());
   std::optional<Estimate> estimate;
   if (queued_.process(estimate) == Progress::no_frame) {
     reached_ns_ = kNever;  // the stamp that reached it was a false one
