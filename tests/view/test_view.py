@@ -7,9 +7,7 @@ without them its test is skipped.
 import csv
 import json
 import math
-import os
 import re
-import shutil
 import socket
 import subprocess
 import sys
@@ -20,6 +18,7 @@ import urllib.request
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "support"))
+from browser import browser_or_reason
 from temporary_folder import InTemporaryFolder
 
 PROGRAM = Path(sys.argv.pop(1)).resolve()
@@ -208,28 +207,9 @@ class Options(SimulatedRecording):
         run.end()
 
 
-def browser_or_reason():
-    """The environment with which look.mjs finds its browser, or the reason why there is none."""
-    chromium = shutil.which("chromium")
-    if not chromium:
-        return None, "no chromium here; Debian's package chromium"
-    if not shutil.which("npm") or not shutil.which("node"):
-        return None, "no Node.js and npm here"
-    shutil.copytree(HERE / "browser", SCRATCH, dirs_exist_ok=True)
-    if not (SCRATCH / "node_modules/playwright-core").is_dir():
-        try:
-            done = subprocess.run(["npm", "ci", "--ignore-scripts", "--no-audit", "--no-fund"], cwd=SCRATCH,
-                                  stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False, timeout=240)
-        except subprocess.TimeoutExpired:
-            return None, "npm's registry does not answer"
-        if done.returncode != 0:
-            return None, "npm could not install playwright-core: " + done.stderr[-300:]
-    return {**os.environ, "CHROMIUM": chromium}, ""
-
-
 class Browser(SimulatedRecording):
     def look(self):
-        environment, reason = browser_or_reason()
+        environment, reason = browser_or_reason(HERE / "browser", SCRATCH)
         if environment is None:
             self.skipTest(reason)
         out = self.work / "seen"
