@@ -1,5 +1,6 @@
 #include "src/live/live_estimator.h"
 
+#include <pthread.h>
 #include <time.h>
 
 #include <algorithm>
@@ -86,6 +87,7 @@ bool LiveEstimator::add_stereo(const StereoFrame& frame) {
 }
 
 void LiveEstimator::run() {
+  ::pthread_setname_np(::pthread_self(), "estimator");  // for top -H, and for who measures it
   while (true) {
     count_waiting();
     while (advance()) continue;
