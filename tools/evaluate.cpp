@@ -33,10 +33,9 @@ struct EvaluateArguments {
 
 void write_report(const fs::path& path, const fs::path& recording, const evaluation::Trajectory& truth,
                   const std::vector<evaluation::ReportEntry>& entries) {
+  const std::vector<evaluation::Moment> moments = film(evaluation::moments_of(entries.front().estimate), recording);
   std::ofstream file(path);
-  file << evaluation::to_html(evaluation::distinct_names({recording}).front(), truth, entries,
-                              film(evaluation::moments_of(entries.front().estimate), recording))
-       << std::flush;
+  file << evaluation::to_html(evaluation::distinct_names({recording}).front(), truth, entries, moments) << std::flush;
   if (!file) throw std::runtime_error(path.string() + ": cannot be written");
 }
 

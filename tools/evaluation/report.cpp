@@ -396,6 +396,7 @@ std::string to_html(const std::string& title, const Trajectory& truth, const std
   evaluations.reserve(entries.size());
   for (const ReportEntry& entry : entries) evaluations.push_back(entry.evaluation);
   std::vector<std::string> classes;
+  classes.reserve(entries.size());
   for (std::size_t i = 0; i < entries.size(); ++i) classes.push_back(colour(i));
   const Range time = time_range(truth, entries);
 
