@@ -1,7 +1,8 @@
 #include "tools/live_view.h"
 
-#include <cstddef>
-#include <cstdint>
+#include <array>
+#include <atomic>
+#include <limits>
 #include <utility>
 #include <vector>
 
@@ -19,46 +20,28 @@ view::Description describe(const std::string& title, const Calibration& calibrat
   return description;
 }
 
-/// A frame that owns its pixels.
-struct KeptFrame {
-  StereoFrame frame;
-  std::vector<std::uint8_t> left, right;
+/// A frame whose pixels the view may have.
+struct Kept {
+  QueuedFrame frame;
+  std::atomic<bool> shown{false};  ///< the view has them
 };
 
-std::vector<std::uint8_t> copied(ImageView& view) {
-  std::vector<std::uint8_t> pixels;
-  pixels.reserve(static_cast<std::size_t>(view.width) * static_cast<std::size_t>(view.height));
-  for (std::ptrdiff_t row = 0; row < view.height; ++row) {
-    const std::uint8_t* const begin = view.data + row * view.stride;
-    pixels.insert(pixels.end(), begin, begin + view.width);
-  }
-  if (!view.empty()) view = {pixels.data(), view.width, view.height, view.width};
-  return pixels;
-}
-
-std::shared_ptr<const KeptFrame> kept(const StereoFrame& frame) {
-  auto copy = std::make_shared<KeptFrame>();
-  copy->frame = frame;
-  copy->left = copied(copy->frame.left);
-  copy->right = copied(copy->frame.right);
-  return copy;
-}
+constexpr TimeNs kNoFrame = std::numeric_limits<TimeNs>::min();
 
 }  // namespace
 
 class LiveView::Impl {
  public:
   Impl(const ViewArguments& args, const std::string& title, const Calibration& calibration)
-      : view_(args, describe(title, calibration)) {}
+      : cameras_(calibration.cameras), view_(args, describe(title, calibration)) {
+    for (Kept& kept : kept_) kept.frame = empty_frame(cameras_);
+  }
 
   [[nodiscard]] live::Onlooker onlooker() {
     const MakeEstimator filter = [](const FilterConfig& config, const Calibration& calibration) {
       return std::make_unique<Filter>(config, calibration);
     };
-    return {view_.tapped(filter),
-            [this](const StereoFrame& frame) {
-              if (view_.due()) frame_ = kept(frame);
-            },
+    return {view_.tapped(filter), [this] { return keep(); },
             [this](const live::LiveFrame& frame, const Odometry& odometry) { take(frame, odometry); }};
   }
 
@@ -68,16 +51,35 @@ class LiveView::Impl {
   }
 
  private:
+  /// Where the next frame is to go, if it is to be shown.
+  QueuedFrame* keep() {
+    next_ = nullptr;
+    if (!view_.due()) return nullptr;
+    for (Kept& kept : kept_) {
+      if (kept.shown.load(std::memory_order_acquire)) continue;
+      next_ = &kept;
+      kept.frame.t_ns = kNoFrame;
+      return &kept.frame;
+    }
+    return nullptr;
+  }
+
   void take(const live::LiveFrame& frame, const Odometry& odometry) {
-    const std::shared_ptr<const KeptFrame> images = std::exchange(frame_, nullptr);  // none of a step without
+    Kept* const kept = std::exchange(next_, nullptr);
     if (!view_.due()) return;
     view::Moment moment = view_.moment(frame.t_ns, frame.estimate, odometry);
-    if (images) view_.add_images(images->frame, images, moment);
+    if (kept != nullptr && kept->frame.t_ns != kNoFrame) {  // else this was a step without images
+      kept->shown = true;
+      const std::shared_ptr<const void> pixels(kept, [](Kept* k) { k->shown.store(false, std::memory_order_release); });
+      view_.add_images(view_of(kept->frame, cameras_), pixels, moment);
+    }
     view_.offer(std::move(moment));
   }
 
-  EstimatorView view_;
-  std::shared_ptr<const KeptFrame> frame_;  ///< at hand; null unless it is to be shown
+  std::vector<CameraCalibration> cameras_;
+  std::array<Kept, 3> kept_;  ///< one at hand, one that waits in the feed, one that it works on
+  Kept* next_ = nullptr;      ///< where the frame at hand goes
+  EstimatorView view_;        ///< last: its feed's thread uses kept_
 };
 
 LiveView::LiveView(const ViewArguments& args, const std::string& title, const Calibration& calibration)

@@ -135,9 +135,9 @@ bool LiveEstimator::take_frame(TimeNs frame_ns) {
     if (*waited_ < kPatience) return false;
     ++impatient_;
   }
-  if (listeners_.on_images) listeners_.on_images(*queued_.next_frame());
+  QueuedFrame* const keep = listeners_.keep_frame ? listeners_.keep_frame() : nullptr;
   std::optional<Estimate> estimate;
-  if (queued_.process(estimate) == Progress::no_frame) {
+  if (queued_.process(estimate, keep) == Progress::no_frame) {
     reached_ns_ = kNever;  // the stamp that reached it was a false one
     return false;
   }

@@ -37,7 +37,8 @@ struct LiveSample {
 struct LiveListeners {
   std::function<void(const LiveFrame&, const Odometry&)> on_frame;
   std::function<void(const LiveSample&)> on_imu;
-  std::function<void(const StereoFrame&)> on_images = {};  ///< before they are estimated from; they are gone afterwards
+  std::function<QueuedFrame*()> keep_frame =
+      {};  ///< before a frame: where it is to be kept, as QueuedOdometry::process
 };
 
 class LiveEstimator {

@@ -131,7 +131,7 @@ LiveListeners Session::listeners() {
             report_.take(sample);
             send(sample);
           },
-          onlooker_.on_images};
+          onlooker_.keep_frame};
 }
 
 template <typename What>

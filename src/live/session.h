@@ -31,8 +31,8 @@ struct SessionOptions {
 
 /// Who looks at what the estimator does, on its thread; each may be empty.
 struct Onlooker {
-  MakeEstimator make;  ///< in place of the filter
-  std::function<void(const StereoFrame&)> on_images;
+  MakeEstimator make;                        ///< in place of the filter
+  std::function<QueuedFrame*()> keep_frame;  ///< as LiveListeners
   std::function<void(const LiveFrame&, const Odometry&)> on_frame;
 };
 
