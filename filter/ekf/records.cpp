@@ -11,6 +11,7 @@ void InnovationLog::add(Source source, const Innovation& innovation, TimeNs t_ns
   record.innovation = innovation.value;
   record.variance = innovation.variance;
   record.gate_ratio = innovation.value * innovation.value / (innovation.gate * innovation.variance);
+  record.score = innovation.score;
   ++(innovation.fits ? record.used : record.rejected);
   if (innovation.fits) record.last_used_ns = t_ns;
 }
@@ -20,6 +21,7 @@ void InnovationLog::add(Source source, const Features& features, TimeNs t_ns) {
   record.innovation = features.rms_px;
   record.variance = features.variance_px2;
   record.gate_ratio = features.rms_px * features.rms_px / (features.gate * features.variance_px2);
+  record.score = features.score;
   record.used += features.used;
   record.rejected += features.rejected;
   if (features.used > 0) record.last_used_ns = t_ns;

@@ -17,6 +17,7 @@ struct Innovation {
   double variance = 0.0;  ///< as expected, the state's share included
   double gate = 0.0;      ///< quantile of value^2 / variance
   bool fits = false;      ///< it passed the gate
+  double score = 1.0;     ///< SourceRecord::score
 };
 
 /// One record a sensor: its last innovation, and how many fitted.
@@ -34,8 +35,12 @@ class InnovationLog {
     double rms_px = 0.0;        ///< of all observations tested [px]
     double variance_px2 = 0.0;  ///< expected [px^2]
     double gate = 0.0;          ///< of the squared distance of one observation
+    double score = 1.0;         ///< SourceRecord::score
   };
   void add(Source source, const Features& features, TimeNs t_ns);
+
+  /// SourceRecord::score of a sensor that is no innovation's.
+  void set_score(Source source, double score) { records_[index_of(source)].score = score; }
 
   [[nodiscard]] const std::array<SourceRecord, kSourceCount>& records() const { return records_; }
 

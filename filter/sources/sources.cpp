@@ -82,15 +82,22 @@ void Sources::advance(TimeNs t_ns, const Advice& advice, Ingest& ingest, Ekf& ek
     }
   }
   propagate(t_ns, advice, ingest, ekf);
+  const ImuNoiseFactors noise = imu_noise(advice);
+  records.log.set_score(Source::gyroscope, 1.0 / noise.gyro);
+  records.log.set_score(Source::accelerometer, 1.0 / noise.accel);
+}
+
+ImuNoiseFactors Sources::imu_noise(const Advice& advice) const {
+  ImuNoiseFactors noise = imu_score_.noise();
+  noise.accel /= advice.of(MotionSensor::imu);  // (15)
+  return noise;
 }
 
 /// Where samples are missing, they may be lost, or the clock jumped: the vehicle went on meanwhile, or it did not.
 void Sources::propagate(TimeNs t_ns, const Advice& advice, Ingest& ingest, Ekf& ekf) const {
   if (t_ns <= ekf.state().imu.t_ns) return;
   ImuInterruption& interruption = ingest.interruption();
-  ImuNoiseFactors noise = imu_score_.noise();
-  noise.accel /= advice.of(MotionSensor::imu);  // (15)
-  const std::optional<TimeNs> uncertain_ns = ekf.propagate(ingest.imu(), t_ns, noise, normal_walk_);
+  const std::optional<TimeNs> uncertain_ns = ekf.propagate(ingest.imu(), t_ns, imu_noise(advice), normal_walk_);
   if (uncertain_ns) interruption.add_uncertain(*uncertain_ns);
   const double unseen = interruption.take_unseen(t_ns);
   if (unseen > 0.0) {

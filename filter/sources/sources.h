@@ -65,6 +65,7 @@ class Sources {
 
  private:
   static void inflate_after_takeoff(Ekf& ekf);
+  [[nodiscard]] ImuNoiseFactors imu_noise(const Advice& advice) const;
   void hold(Ekf& ekf, Records& records);
 
   ImuCalibration imu_;

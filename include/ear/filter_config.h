@@ -27,6 +27,7 @@ struct PriorConfig {
   double camera_position = 1e-3;    ///< [m]
   double stereo_rotation = 2e-3;    ///< [rad] camera 1 in camera 0, the error of its principal point included
   double stereo_position = 5e-5;    ///< [m]
+  double focal_length = 1e-3;       ///< relative; counts as an error of the stereo baseline's length
   double time_offset = 2e-3;        ///< [s] camera against IMU
   double wheel_radius = 4e-3;       ///< of both wheels alike, relative
   double wheel_apart = 1e-3;        ///< of each wheel by itself, relative

@@ -72,8 +72,8 @@ inline constexpr std::array<const char*, kSourceCount> kSourceNames{"camera_left
 enum class Aiding : std::uint8_t { none, standing, wheels, cameras, cameras_and_wheels };
 
 /// The last measurement of one source, against what was expected. Cameras: root mean square over the features tested
-/// [px]; wheels: speed over the ground [m/s]; beams: range [m]. The inertial sensors, which nothing predicts, count
-/// only.
+/// [px]; wheels: speed over the ground [m/s]; beams: range [m]. The inertial sensors, which nothing predicts, have a
+/// score only.
 struct SourceRecord {
   double innovation = 0.0;  ///< measured - predicted
   double variance = 0.0;    ///< of the innovation, as expected
@@ -81,6 +81,9 @@ struct SourceRecord {
   int used = 0;             ///< measurements that fitted since the frame before
   int rejected = 0;         ///< measurements that did not
   TimeNs last_used_ns = 0;  ///< when one fitted last (IMU time); 0: never
+  /// Consistency score, in (0, 1]: at the last update the standard deviation of its noise was that of the settings and
+  /// the calibration over this; the weight (15) is part of it. docs/health.md.
+  double score = 1.0;
 };
 
 struct Health {

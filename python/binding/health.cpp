@@ -60,7 +60,8 @@ void bind_health(py::module_& module) {
   using R = SourceRecord;
   bind_value(module, "SourceRecord", "The last measurement of one source, against what was expected.",
              Field{"innovation", &R::innovation}, Field{"variance", &R::variance}, Field{"gate_ratio", &R::gate_ratio},
-             Field{"used", &R::used}, Field{"rejected", &R::rejected}, Field{"last_used_ns", &R::last_used_ns});
+             Field{"used", &R::used}, Field{"rejected", &R::rejected}, Field{"last_used_ns", &R::last_used_ns},
+             Field{"score", &R::score});
   py::class_<Health> health(module, "Health", "What the estimator reports of itself; str() says it in words.");
   health.attr("_fields") =
       py::make_tuple("status", "reason", "since_ns", "faulty", "onset_ns", "imprecise", "aiding", "quality",

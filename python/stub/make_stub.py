@@ -53,7 +53,7 @@ FIELDS = {
     "available": "tuple[bool, bool, bool]", "coefficient": "tuple[float, float, float]",
     "weight": "tuple[float, float, float]", "AnomalyConfig.weight": "str",
     "anomalous": 'Literal["imu", "odometer", "camera"] | None', "disagree": "bool", "rejected": "int",
-    "SourceRecord.rejected": "int",
+    "SourceRecord.rejected": "int", "SourceRecord.score": "float",
     "faulty": "tuple[str, ...]", "onset_ns": "dict[str, int]", "sources": "dict[str, SourceRecord]",
     "Health.status": "HealthStatus", "Health.reason": "Reason", "Health.since_ns": "int", "Health.imprecise": "bool",
     "Health.aiding": "Aiding", "Health.quality": "int", "Health.horizontal_sigma": "float",

@@ -108,6 +108,9 @@ ros2::DiagnosticArray RosMessages::diagnostics(TimeNs t_ns, const Health& health
   for (std::size_t i = 0; i < kSourceCount; ++i) {
     if (health.faulty[i]) status.values.push_back({"faulty", kSourceNames[i]});
   }
+  for (std::size_t i = 0; i < kSourceCount; ++i) {
+    status.values.push_back({std::string("score ") + kSourceNames[i], number(health.sources[i].score)});
+  }
   return {{ros2::time_of_stamp(t_ns), ""}, {status}};
 }
 

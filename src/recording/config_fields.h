@@ -64,6 +64,7 @@ EnableFor<C, PriorConfig> visit(C& c, F&& f) {
   f("camera_position", c.camera_position);
   f("stereo_rotation", c.stereo_rotation);
   f("stereo_position", c.stereo_position);
+  f("focal_length", c.focal_length);
   f("time_offset", c.time_offset);
   f("wheel_radius", c.wheel_radius);
   f("wheel_apart", c.wheel_apart);

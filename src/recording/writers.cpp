@@ -40,11 +40,13 @@ std::string states_heading() {
   for (const SigmaGroup& group : kSigmas) {
     for (const char* axis : {"_x", "_y", "_z"}) heading += std::string(",sigma_") + group.name + axis;
   }
-  return heading +
-         ",tracks,stereo,features_used,features_rejected,clones,wheel_rows_used,wheel_rows_rejected,beams_used,"
-         "beams_rejected,standing,on_ground,slope_along,slope_across,sigma_slope_along,sigma_slope_across,"
-         "weight_imu,weight_odometer,weight_camera,inconsistency_imu,inconsistency_odometer,inconsistency_camera,"
-         "displacement_variance,disagreement,anomalous,mode,health,quality,load_step\n";
+  heading +=
+      ",tracks,stereo,features_used,features_rejected,clones,wheel_rows_used,wheel_rows_rejected,beams_used,"
+      "beams_rejected,standing,on_ground,slope_along,slope_across,sigma_slope_along,sigma_slope_across,"
+      "weight_imu,weight_odometer,weight_camera,inconsistency_imu,inconsistency_odometer,inconsistency_camera,"
+      "displacement_variance,disagreement,anomalous,mode,health,quality,load_step";
+  for (const char* source : kSourceNames) heading += std::string(",score_") + source;
+  return heading + "\n";
 }
 
 void append(std::string& line, double value) {
@@ -184,6 +186,7 @@ void StatesWriter::write(const Estimate& estimate, std::string health) {
   std::replace(health.begin(), health.end(), ',', ';');
   line +=
       "," + health + "," + std::to_string(estimate.health.quality) + "," + std::to_string(estimate.health.load_step);
+  for (const SourceRecord& record : estimate.health.sources) append(line, record.score);
   out_.write(line + "\n");
 }
 

@@ -58,7 +58,7 @@ Json sources_json(const Moment& moment) {
   const TimeNs now = moment.estimate ? moment.estimate->state.t_ns : moment.t_ns;
   for (const SourceRecord& record : moment.health.sources) {
     const Json age = record.last_used_ns == 0 ? Json(nullptr) : number(seconds_between(record.last_used_ns, now));
-    list.push_back({number(record.gate_ratio), record.used, record.rejected, age});
+    list.push_back({number(record.gate_ratio), record.used, record.rejected, age, number(record.score)});
   }
   return list;
 }

@@ -88,6 +88,7 @@ FilterConfig simulated_noise(const Case& setup, const simulator::Options& option
   config.prior.stereo_rotation = 0.02 * M_PI / 180.0 / std::sqrt(3.0);
   config.prior.camera_position = 1e-5;
   config.prior.stereo_position = 1e-5;
+  config.prior.focal_length = 0.0;
   config.prior.time_offset = 1e-3;
   return config;
 }

@@ -229,6 +229,7 @@ TEST_CASE("C interface: estimates are those of class Odometry, bit for bit") {
   CHECK(health.quality == expected.back().health.quality);
   CHECK(health.horizontal_sigma == expected.back().health.horizontal_sigma);
   CHECK(health.vertical_sigma == expected.back().health.vertical_sigma);
+  for (std::size_t i = 0; i < kSourceCount; ++i) CHECK(health.score[i] == expected.back().health.sources[i].score);
 }
 
 TEST_CASE("C interface: before the start the health says so, and after a gap which sensor it does without") {

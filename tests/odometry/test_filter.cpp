@@ -266,6 +266,27 @@ TEST_CASE("filter: wild observations do no harm") {
   CHECK(Solver(filter.ekf().covariance().matrix()).eigenvalues().minCoeff() > -1e-9);
 }
 
+TEST_CASE("filter: an unknown focal length counts as a baseline that is less well known, where none states its error") {
+  const simulator::Simulation simulation = simulate("flat1", 3.0);
+  Calibration calibration = simulation.calibration();
+  const PriorConfig prior;
+  const auto sigma = [&](double focal_length) {
+    FilterConfig config;
+    config.prior.focal_length = focal_length;
+    Filter filter(config, calibration);
+    run_filter(filter, simulation);
+    return Eigen::Vector3d(filter.ekf().covariance().matrix().diagonal().segment<3>(err::stereo + 3).cwiseSqrt());
+  };
+  const double baseline =
+      (calibration.cameras[1].T_BC.translation() - calibration.cameras[0].T_BC.translation()).norm();
+  const double along = std::hypot(prior.stereo_position, prior.focal_length * baseline);
+  CHECK(sigma(prior.focal_length).x() == doctest::Approx(along).epsilon(0.02));
+  CHECK(sigma(prior.focal_length).y() == doctest::Approx(prior.stereo_position).epsilon(0.02));
+  CHECK(sigma(0.0).x() == doctest::Approx(prior.stereo_position).epsilon(0.02));
+  calibration.cameras[1].pose_sigma = PoseSigma{prior.stereo_rotation, 3e-5};
+  CHECK(sigma(prior.focal_length).x() == doctest::Approx(3e-5).epsilon(0.02));
+}
+
 TEST_CASE("filter: a gap in the inertial data is counted and survived") {
   const simulator::Simulation simulation = simulate("flat1", 15.0);
   Filter filter(FilterConfig{}, simulation.calibration());

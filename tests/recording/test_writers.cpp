@@ -28,6 +28,7 @@ Estimate numbered_estimate() {
   e.consistency = {{true, true, true}, {0.01, 0.02, 0.03}, {1.0, 0.25, 1.0}, 4e-4, 0.02, 0.01, MotionSensor::odometer};
   e.health.quality = 75;
   e.health.load_step = 2;
+  e.health.sources[index_of(Source::wheel_right)].score = 0.125;
   return e;
 }
 
@@ -72,7 +73,7 @@ TEST_CASE("states: every value stands below its name") {
   }
   CHECK_FALSE(std::getline(fields, field, ','));
 
-  CHECK(row.size() == 1 + 3 + 4 + 9 + 21 + 9 + 11 + 4 + 9 + 4);
+  CHECK(row.size() == 1 + 3 + 4 + 9 + 21 + 9 + 11 + 4 + 9 + 4 + 9);
   CHECK(row["t_ns"] == "1403715273262142976");
   CHECK(row["p_z"] == "3");
   CHECK(row["q_w"] == "0.5");
@@ -105,6 +106,8 @@ TEST_CASE("states: every value stands below its name") {
   CHECK(row["health"] == "degraded: without a; b");
   CHECK(row["quality"] == "75");
   CHECK(row["load_step"] == "2");
+  CHECK(row["score_wheel_left"] == "1");
+  CHECK(row["score_wheel_right"] == "0.125");
 }
 
 TEST_CASE("summary: valid JSON with all that was said") {

@@ -121,6 +121,7 @@ void TrackUpdate::log(const Ekf& ekf, Records& records) const {
     features.rms_px = std::sqrt(seen.squares_px2 / seen.count);
     features.variance_px2 = config_.feature_sigma_px * config_.feature_sigma_px;
     features.gate = ekf.gate().quantile(1);
+    features.score = 1.0 / ekf.state().clones.back().feature_noise;
     records.log.add(camera == 0 ? Source::camera_left : Source::camera_right, features, ekf.state().imu.t_ns);
   }
 }

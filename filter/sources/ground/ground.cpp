@@ -65,10 +65,11 @@ void Ground::update(const BeamRanges& reading, const ImuBuffer& imu, CameraUpdat
 /// it is the plane that is wrong, and what pull they keep brings it back.
 Innovation Ground::weigh(GroundRows<kMaxBeams + 1>& z, NoiseScore& score, TimeNs t_ns, const Ekf& ekf) const {
   const int row = z.count++;
-  const Innovation innovation = ekf.test(z.H.row(row), z.residual(row), z.sigma(row));
+  Innovation innovation = ekf.test(z.H.row(row), z.residual(row), z.sigma(row));
   const double noise = z.sigma(row) * z.sigma(row);
   z.sigma(row) *=
       std::sqrt(score.add(innovation.value, {innovation.variance - noise, noise, false, config_.scores}, t_ns));
+  innovation.score = score.weight();
   return innovation;
 }
 

@@ -22,7 +22,7 @@ void Wheels::update(const WheelIncrement& increment, const Context& context, Ekf
   const MeanRate rate = context.imu.mean_rate(increment.from_ns, increment.to_ns);
   WheelRows rows = linearize_wheels(x, motion.R_WB, motion.v_W, increment, rate.gyro_B, config_.model, sees_ground_);
   Sigmas sigma = noise_of(rows, increment, rate, x);
-  score_wheels(rows, sigma, increment.to_ns, context.supported, ekf, records);
+  score_wheels(rows, sigma, increment.to_ns, context, ekf, records);
 
   const bool use_yaw_rate = config_.model != OdometerModel::gyro;
   const std::array<bool, WheelRows::size> use = {true, true, !uses_plane() || context.ground_known, use_yaw_rate};
@@ -85,7 +85,7 @@ Wheels::Sigmas Wheels::noise_of(const WheelRows& rows, const WheelIncrement& inc
 
 /// Each wheel by itself: the axle's speed and yaw rate predict how fast it should roll. Where the speed is measured
 /// moves along the axle to the wheel that fits better, and its noise grows with what both have.
-void Wheels::score_wheels(WheelRows& rows, Sigmas& sigma, TimeNs t_ns, bool supported, const Ekf& ekf,
+void Wheels::score_wheels(WheelRows& rows, Sigmas& sigma, TimeNs t_ns, const Context& context, const Ekf& ekf,
                           Records& records) {
   const double half = 0.5 * ekf.state().odometer.track_width;
   const double noise = std::hypot(sigma(WheelRows::speed), half * sigma(WheelRows::yaw_rate));
@@ -99,8 +99,9 @@ void Wheels::score_wheels(WheelRows& rows, Sigmas& sigma, TimeNs t_ns, bool supp
     NoiseScore& score = running_.wheel[i];
     information[i] =
         1.0 / score.add(innovation.value,
-                        {innovation.variance - noise * noise, noise * noise, supported, config_.scores}, t_ns);
+                        {innovation.variance - noise * noise, noise * noise, context.supported, config_.scores}, t_ns);
     innovation.fits = score.fits();
+    innovation.score = context.weight * score.weight();
     records.log.add(i == 0 ? Source::wheel_left : Source::wheel_right, innovation, t_ns);
     count(score, records.statistics);
   }

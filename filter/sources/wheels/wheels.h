@@ -48,7 +48,8 @@ class Wheels {
   [[nodiscard]] bool uses_plane() const { return config_.model == OdometerModel::terrain && sees_ground_; }
   [[nodiscard]] Sigmas noise_of(const WheelRows& rows, const WheelIncrement& increment, const MeanRate& rate,
                                 const State& x) const;
-  void score_wheels(WheelRows& rows, Sigmas& sigma, TimeNs t_ns, bool supported, const Ekf& ekf, Records& records);
+  void score_wheels(WheelRows& rows, Sigmas& sigma, TimeNs t_ns, const Context& context, const Ekf& ekf,
+                    Records& records);
   static void count(const NoiseScore& score, FrameStatistics& statistics);
 
   /// What the last increments have shown.

@@ -140,15 +140,14 @@ function showSources(m) {
     : name === "camera_left" ? model.about.cameras.length > 0 : name === "camera_right" ? model.about.cameras.length > 1 : true);
   const rows = model.about.sources.flatMap((name, i) => {
     if (!has(name)) return [];
-    const [score, used, rejected, last] = m.sources[i];
+    const [fit, used, rejected, last, score] = m.sources[i];
     const old = last !== null && last > 1; // a score of long ago, as of wheels in flight
     const row = element("tr", undefined, `${m.faulty.includes(name) ? "faulty" : ""} ${old ? "old" : ""}`.trim());
-    const cell = element("td"), gauge = element("span", undefined, `gauge${score > 1 ? " over" : ""}`), fill = element("span");
-    const inertial = name === "gyroscope" || name === "accelerometer"; // counted, as nothing predicts them
-    fill.style.width = `${Math.min(100, 50 * (score || 0))}%`;
+    const cell = element("td"), gauge = element("span", undefined, `gauge${score < 0.5 ? " over" : ""}`), fill = element("span");
+    fill.style.width = `${100 * score}%`;
     gauge.append(fill);
-    if (!inertial) cell.append(gauge);
-    cell.append(inertial ? "-" : score === null ? "-" : score.toFixed(2));
+    cell.append(gauge, score.toFixed(2));
+    if (fit !== null) cell.title = `last measurement: ${fit.toFixed(2)} of what still fits`;
     row.append(element("td", name.replace("_", " ")), cell, element("td", used, "n"), element("td", rejected, "n"),
       element("td", last === null ? "-" : last.toFixed(1), "n"));
     return [row];
