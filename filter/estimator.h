@@ -4,10 +4,12 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <optional>
+#include <vector>
 
 #include "ear/estimate.h"
 #include "ear/given_start.h"
 #include "ear/types.h"
+#include "filter/ekf/records.h"
 #include "filter/ekf/state.h"
 
 namespace ear {
@@ -69,6 +71,16 @@ class Estimator {
   [[nodiscard]] virtual TimeNs camera_time(TimeNs imu_time_ns) const = 0;
 
   [[nodiscard]] virtual CalibrationState calibration() const = 0;
+
+  /// From now on each frame leaves in `outcomes`, which must outlive this, what became of the tracks that it tested;
+  /// an estimator that does not know leaves nothing. Null: no longer.
+  void report_tracks(std::vector<TrackOutcome>* outcomes) { outcomes_ = outcomes; }
+
+ protected:
+  [[nodiscard]] std::vector<TrackOutcome>* outcomes() const { return outcomes_; }
+
+ private:
+  std::vector<TrackOutcome>* outcomes_ = nullptr;
 };
 
 }  // namespace ear

@@ -83,6 +83,7 @@ void Filter::propagate_to(const FeatureFrame& frame) {
   const TimeNs t_ns = imu_time(frame.t_ns, ekf_.state().camera);
   last_frame_ns_ = frame.t_ns;
   consistency_ = Consistency{};
+  records_.outcomes = outcomes();
   records_ = records_for(frame, records_, sources_.on_ground());
   sources_.look_at(frame, t_ns, ingest_, ekf_);
   if (ekf_.running()) {
@@ -161,6 +162,7 @@ void Filter::restart(TimeNs t_ns, TimeNs clock_shift) {
   fresh.health_.succeed(health_, t_ns);
   fresh.alignment_ = alignment_;
   fresh.last_good_ = std::move(last_good_);
+  fresh.report_tracks(outcomes());
   if (fresh.last_good_) fresh.last_good_->state.t_ns += clock_shift;
   if (ekf_.running() || without_state_ == Status::lost) fresh.without_state_ = Status::lost;
   *this = std::move(fresh);

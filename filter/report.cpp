@@ -11,6 +11,7 @@ namespace ear {
 Records records_for(const FeatureFrame& frame, const Records& before, bool on_ground) {
   Records records = before;
   records.log.start_frame();
+  if (records.outcomes != nullptr) records.outcomes->clear();
   records.statistics = FrameStatistics{};
   records.statistics.tracks = static_cast<int>(frame.features.size());
   records.statistics.stereo = static_cast<int>(std::count_if(frame.features.begin(), frame.features.end(),

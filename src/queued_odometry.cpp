@@ -45,10 +45,9 @@ std::size_t elements(double seconds, double rate_hz) {
   return static_cast<std::size_t>(std::max(kMinCapacity, std::ceil(seconds * rate_hz)));
 }
 
-std::size_t pixels(const Calibration& calibration, std::size_t camera) {
-  if (camera >= calibration.cameras.size()) return 0;
-  return static_cast<std::size_t>(calibration.cameras[camera].width) *
-         static_cast<std::size_t>(calibration.cameras[camera].height);
+std::size_t pixels(const std::vector<CameraCalibration>& cameras, std::size_t camera) {
+  if (camera >= cameras.size()) return 0;
+  return static_cast<std::size_t>(cameras[camera].width) * static_cast<std::size_t>(cameras[camera].height);
 }
 
 void copy_rows(const ImageView& from, std::vector<std::uint8_t>& to) {
@@ -64,24 +63,35 @@ ImageView view_of_rows(const std::vector<std::uint8_t>& rows, const CameraCalibr
 
 }  // namespace
 
+QueuedFrame empty_frame(const std::vector<CameraCalibration>& cameras) {
+  return {0, std::vector<std::uint8_t>(pixels(cameras, 0)), std::vector<std::uint8_t>(pixels(cameras, 1)), false};
+}
+
+StereoFrame view_of(const QueuedFrame& frame, const std::vector<CameraCalibration>& cameras) {
+  StereoFrame view;
+  view.t_ns = frame.t_ns;
+  view.left = view_of_rows(frame.left, cameras.front());
+  if (frame.has_right) view.right = view_of_rows(frame.right, cameras[1]);
+  return view;
+}
+
 QueuedOdometry::QueuedOdometry(const Config& config, const Calibration& calibration, const QueueCapacity& capacity,
-                               Clock clock)
-    : odometry_(config, checked(calibration, capacity), std::move(clock)),
+                               Clock clock, MakeEstimator make)
+    : odometry_(make ? OdometryFactory::make(config, checked(calibration, capacity), std::move(make), std::move(clock))
+                     : Odometry(config, checked(calibration, capacity), std::move(clock))),
       drops_frames_(config.performance.budget_ms > 0.0),
       cameras_(calibration.cameras),
       camera_offset_ns_(std::llround(1e9 * calibration.camera_time_offset)),
       imu_(elements(capacity.seconds, calibration.imu.rate_hz), {}),
       encoder_(calibration.encoder ? elements(capacity.seconds, calibration.encoder->rate_hz) : 0, {}),
       laser_(calibration.lasers ? elements(capacity.seconds, calibration.lasers->rate_hz) : 0, {}),
-      frames_(calibration.cameras.empty() ? 0 : capacity.frame_slots,
-              {0, std::vector<std::uint8_t>(pixels(calibration, 0)), std::vector<std::uint8_t>(pixels(calibration, 1)),
-               false}),
+      frames_(calibration.cameras.empty() ? 0 : capacity.frame_slots, empty_frame(calibration.cameras)),
       live_(imu_.queue.capacity()) {
   if (calibration.lasers) laser_sample_.range.resize(calibration.lasers->beams.size());
 }
 
 bool QueuedOdometry::add_stereo(const StereoFrame& frame) {
-  Frame* const slot = frames_.queue.slot_to_fill();
+  QueuedFrame* const slot = frames_.queue.slot_to_fill();
   if (slot == nullptr) {
     frames_.overflows.fetch_add(1, std::memory_order_relaxed);
     return false;
@@ -92,14 +102,6 @@ bool QueuedOdometry::add_stereo(const StereoFrame& frame) {
   if (slot->has_right) copy_rows(frame.right, slot->right);
   frames_.queue.push();
   return true;
-}
-
-StereoFrame QueuedOdometry::view_of(const Frame& frame) const {
-  StereoFrame view;
-  view.t_ns = frame.t_ns;
-  view.left = view_of_rows(frame.left, cameras_.front());
-  if (frame.has_right) view.right = view_of_rows(frame.right, cameras_[1]);
-  return view;
 }
 
 /// The sum as a difference, which stays in range whatever the camera's stamp is.
@@ -164,10 +166,10 @@ void QueuedOdometry::log_overflows() {
   }
 }
 
-Progress QueuedOdometry::process(std::optional<Estimate>& estimate) {
+Progress QueuedOdometry::process(std::optional<Estimate>& estimate, QueuedFrame* keep) {
   if (drops_frames_) drop_old_frames();
   log_overflows();
-  const Frame* const frame = frames_.queue.front();
+  QueuedFrame* const frame = frames_.queue.front_to_empty();
   if (frame == nullptr) {
     hand_over(std::numeric_limits<TimeNs>::max());
     return Progress::no_frame;
@@ -175,14 +177,15 @@ Progress QueuedOdometry::process(std::optional<Estimate>& estimate) {
   const TimeNs frame_ns = imu_time(frame->t_ns);
   hand_over(frame_ns);
   if (newest_imu_ns_ < frame_ns && !frames_.queue.full()) return Progress::no_frame;
-  estimate = odometry_.add_stereo(view_of(*frame));
+  estimate = odometry_.add_stereo(view_of(*frame, cameras_));
+  if (keep != nullptr) std::swap(*frame, *keep);
   frames_.queue.pop();
   set_live_state();
   return estimate ? Progress::estimated : Progress::taken;
 }
 
 std::optional<TimeNs> QueuedOdometry::next_frame_ns() const {
-  const Frame* const frame = frames_.queue.front();
+  const QueuedFrame* const frame = frames_.queue.front();
   return frame == nullptr ? std::nullopt : std::optional(imu_time(frame->t_ns));
 }
 

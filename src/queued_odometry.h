@@ -12,6 +12,7 @@
 #include "filter/ingest/stamp_guard.h"
 #include "src/live_state.h"
 #include "src/log/repeat_limit.h"
+#include "src/odometry_factory.h"
 #include "src/sample_queue.h"
 
 namespace ear {
@@ -27,6 +28,17 @@ struct QueueCapacity {
 struct Overflows {
   std::uint64_t imu = 0, encoder = 0, laser = 0, frames = 0;
 };
+
+/// A stereo frame that owns its pixels, in rows without gaps.
+struct QueuedFrame {
+  TimeNs t_ns = 0;
+  std::vector<std::uint8_t> left, right;  ///< of the cameras' sizes
+  bool has_right = false;
+};
+
+/// With memory for images of these cameras.
+[[nodiscard]] QueuedFrame empty_frame(const std::vector<CameraCalibration>& cameras);
+[[nodiscard]] StereoFrame view_of(const QueuedFrame& frame, const std::vector<CameraCalibration>& cameras);
 
 /// What became of the oldest frame.
 enum class Progress : std::uint8_t {
@@ -45,8 +57,9 @@ class QueuedOdometry {
     std::array<double, kMaxBeams> range{};
   };
 
-  /// Throws std::invalid_argument, naming the field. `clock` as for Odometry.
-  QueuedOdometry(const Config& config, const Calibration& calibration, const QueueCapacity& capacity, Clock clock = {});
+  /// Throws std::invalid_argument, naming the field. `clock` as for Odometry; `make`: in place of the filter.
+  QueuedOdometry(const Config& config, const Calibration& calibration, const QueueCapacity& capacity, Clock clock = {},
+                 MakeEstimator make = {});
 
   /// Each by one thread. False: the queue is full; the sample is counted.
   bool add_imu(const ImuSample& sample) {
@@ -64,8 +77,8 @@ class QueuedOdometry {
   /// All that follows belongs to the thread that estimates. Hands over what waits, ordered by time, up to the oldest
   /// frame, and that frame once inertial samples reach it or all slots are taken. With a budget
   /// (PerformanceConfig::budget_ms), frames but the newest are dropped while more than half of the inertial samples'
-  /// queue waits.
-  Progress process(std::optional<Estimate>& estimate);
+  /// queue waits. `keep`, if there is one, gets a frame that was taken, in exchange for its own: an empty_frame().
+  Progress process(std::optional<Estimate>& estimate, QueuedFrame* keep = nullptr);
   /// The time of the oldest frame that waits (IMU time), or nothing.
   [[nodiscard]] std::optional<TimeNs> next_frame_ns() const;
   void start_at(const GivenStart& start) { odometry_.start_at(start); }
@@ -85,12 +98,6 @@ class QueuedOdometry {
 
     Inlet(std::size_t capacity, const T& element) : queue(capacity, element) {}
   };
-  struct Frame {
-    TimeNs t_ns = 0;
-    std::vector<std::uint8_t> left, right;  ///< rows without gaps
-    bool has_right = false;
-  };
-
   template <typename T>
   static bool add(Inlet<T>& inlet, const T& sample) {
     T* const slot = inlet.queue.slot_to_fill();
@@ -103,7 +110,6 @@ class QueuedOdometry {
     return true;
   }
 
-  [[nodiscard]] StereoFrame view_of(const Frame& frame) const;
   [[nodiscard]] TimeNs imu_time(TimeNs camera_ns) const;
   void drop_old_frames();
   void hand_over(const ImuSample& sample);
@@ -118,7 +124,7 @@ class QueuedOdometry {
   Inlet<ImuSample> imu_;
   Inlet<EncoderSample> encoder_;
   Inlet<Ranges> laser_;
-  Inlet<Frame> frames_;
+  Inlet<QueuedFrame> frames_;
   LaserSample laser_sample_;                                   ///< reused
   StampGuard imu_stamps_;                                      ///< as the estimator judges them
   TimeNs newest_imu_ns_ = std::numeric_limits<TimeNs>::min();  ///< that was handed over and is no false one

@@ -27,6 +27,8 @@ class SampleQueue {
     const std::size_t begin = begin_.load(std::memory_order_relaxed);
     return begin == end_.load(std::memory_order_acquire) ? nullptr : &slots_[begin];
   }
+  /// The same, to take out what it owns; what is left there is used again.
+  [[nodiscard]] T* front_to_empty() { return const_cast<T*>(front()); }
   void pop() { begin_.store(after(begin_.load(std::memory_order_relaxed)), std::memory_order_release); }
 
   /// Seen from the thread that takes out, as is the next.

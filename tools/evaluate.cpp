@@ -12,9 +12,11 @@
 
 #include "tools/commands.h"
 #include "tools/evaluation/evaluate.h"
+#include "tools/evaluation/moments.h"
 #include "tools/evaluation/read.h"
 #include "tools/evaluation/report.h"
 #include "tools/evaluation/summary.h"
+#include "tools/filmstrip.h"
 
 namespace ear::tools {
 namespace {
@@ -29,10 +31,11 @@ struct EvaluateArguments {
   fs::path report;
 };
 
-void write_report(const fs::path& path, const std::string& title, const evaluation::Trajectory& truth,
+void write_report(const fs::path& path, const fs::path& recording, const evaluation::Trajectory& truth,
                   const std::vector<evaluation::ReportEntry>& entries) {
+  const std::vector<evaluation::Moment> moments = film(evaluation::moments_of(entries.front().estimate), recording);
   std::ofstream file(path);
-  file << evaluation::to_html(title, truth, entries) << std::flush;
+  file << evaluation::to_html(evaluation::distinct_names({recording}).front(), truth, entries, moments) << std::flush;
   if (!file) throw std::runtime_error(path.string() + ": cannot be written");
 }
 
@@ -53,8 +56,7 @@ void evaluate(const EvaluateArguments& arguments) {
     evaluations.push_back(evaluation::evaluate(estimate, truth, arguments.kind, terrain));
     entries.push_back({std::move(estimate), evaluations.back()});
   }
-  if (!arguments.report.empty())
-    write_report(arguments.report, evaluation::distinct_names({truth_path}).front(), truth.poses, entries);
+  if (!arguments.report.empty()) write_report(arguments.report, truth_path, truth.poses, entries);
   std::cout << (arguments.json ? evaluation::to_json(evaluations, truth_path.string())
                                : evaluation::to_table(evaluations));
 }

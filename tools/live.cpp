@@ -13,6 +13,7 @@
 #include "src/recording/calibration_files.h"
 #include "src/recording/input_error.h"
 #include "tools/commands.h"
+#include "tools/live_view.h"
 #include "tools/opened_recording.h"
 
 namespace ear::tools {
@@ -22,6 +23,7 @@ struct LiveArguments {
   std::filesystem::path config;
   std::filesystem::path sensors;
   live::SessionOptions session;
+  ViewArguments view;
 };
 
 /// SIGINT and SIGTERM are taken from a queue, by the main thread; all threads that begin later inherit that.
@@ -60,6 +62,12 @@ std::filesystem::path folder_of(const LiveArguments& args, const live::LiveSetti
   return std::filesystem::is_directory(args.sensors / "mav0") ? args.sensors / "mav0" : std::filesystem::path();
 }
 
+/// What the page is headed with.
+std::string title_of(const LiveArguments& args) {
+  const std::filesystem::path source = args.sensors.empty() ? args.config : args.sensors;
+  return (source.has_filename() ? source : source.parent_path()).filename().string();
+}
+
 void run_live(const LiveArguments& args) {
   const StopSignals signals;
   cv::setNumThreads(1);
@@ -82,11 +90,15 @@ void run_live(const LiveArguments& args) {
   }
   live::require_usable(*calibration, settings);
   const live::SensorFiles files(*calibration, folder_of(args, settings));
-  live::Session session(args.session, settings, files.read(), files.folder(), ros.get(), player.get());
+  std::optional<LiveView> view;
+  if (args.view.port >= 0) view.emplace(args.view, title_of(args), files.read());
+  live::Session session(args.session, settings, files.read(), files.folder(), ros.get(), player.get(),
+                        view ? view->onlooker() : live::Onlooker{});
   const std::string reason = session.run([&] { return signals.wait(); }, notifier);
   notifier.stopping();
   log_info("stops: " + reason);
   session.stop();
+  if (view) log_info(view->finish());
   session.judge();
 }
 
@@ -108,6 +120,7 @@ void add_live_command(CLI::App& app) {
   command->add_flag(
       "--check", session.check,
       "Before a flight, by hand: lift, push, turn and roll the vehicle, and see whether its sensors agree");
+  add_view_options(*command, args->view);
   if (const std::string missing = live::missing_ros_parts(); !missing.empty())
     command->footer("Not in this program: " + missing);
   command->callback([args] { run_live(*args); });

@@ -181,7 +181,7 @@ void run(const RunArguments& args) {
     throw InputError(located(args.recording, 0, missing->where, missing->message));
   }
   std::optional<RunView> view;
-  if (args.view.port >= 0) view.emplace(args.view, args.recording, recording);
+  if (args.view.server.port >= 0) view.emplace(args.view, args.recording, recording);
   const MakeEstimator make = estimator_named(args.estimator);
   Odometry odometry = OdometryFactory::make(config, recording.calibration(), view ? view->tapped(make) : make);
   if (!args.start.empty()) odometry.start_at(load_start(args.start, recording.span()));

@@ -2,14 +2,11 @@
 
 #include <array>
 #include <chrono>
-#include <cstdio>
 #include <optional>
 #include <thread>
 #include <utility>
 
-#include "src/view/feature_tap.h"
-#include "src/view/feed.h"
-#include "src/view/server.h"
+#include "tools/estimator_view.h"
 #include "tools/real_time.h"
 #include "tools/view_truth.h"
 
@@ -32,65 +29,40 @@ class RunView::Impl {
   Impl(const RunViewArguments& args, const std::filesystem::path& recording, const Recording& opened)
       : hold_(args.hold),
         truth_(recording),
-        feed_(describe(recording, opened.calibration(), truth_.known())),
-        server_({args.address, args.port, args.token}, feed_) {
-    const std::string query = args.token.empty() ? "" : "?token=" + args.token;
-    std::fprintf(stderr, "view: http://%s:%d/%s\n", args.address.c_str(), server_.port(), query.c_str());
+        view_(args.server, describe(recording, opened.calibration(), truth_.known())) {
     if (args.real_time) clock_.emplace(opened.span().first_ns);
   }
 
-  [[nodiscard]] MakeEstimator tapped(MakeEstimator make) const { return view::tapped(std::move(make), tap_); }
+  [[nodiscard]] MakeEstimator tapped(MakeEstimator make) const { return view_.tapped(std::move(make)); }
 
   void before_sample(const Sample& sample) {
     if (clock_) clock_->wait_until(time_of(sample));
     if (const auto* frame = std::get_if<RecordedFrame>(&sample)) frames_ = {frames_[1], *frame};
-    if (const auto* laser = std::get_if<LaserSample>(&sample)) ranges_ = laser->range;
   }
 
   void after_frame(const ReplayedFrame& frame, const Odometry& odometry) {
     const std::optional<Eigen::Vector3d> truth = frame.estimate ? truth_.at(frame.estimate->state) : std::nullopt;
-    if (!feed_.due()) return;
-    view::Moment moment;
-    moment.t_ns = frame.t_ns;
-    moment.estimate = frame.estimate;
-    moment.health = odometry.health();
-    moment.counts = odometry.input_counts();
-    moment.stages = odometry.stage_times();
-    moment.ranges = ranges_;
+    if (!view_.due()) return;
+    view::Moment moment = view_.moment(frame.t_ns, frame.estimate, odometry);
     moment.truth = truth;
     for (const RecordedFrame& recorded : frames_) {
-      if (recorded.t_ns != frame.t_ns || recorded.left.empty()) continue;
-      moment.left = recorded.left;
-      moment.right = recorded.right;
-      moment.pixels = recorded.pixels;
-      moment.features = tap_->features();
+      if (recorded.t_ns == frame.t_ns && !recorded.left.empty()) view_.add_images(recorded, recorded.pixels, moment);
     }
-    feed_.offer(std::move(moment));
+    view_.offer(std::move(moment));
   }
 
   [[nodiscard]] std::string finish() {
-    feed_.finish();
+    view_.finish();
     std::this_thread::sleep_for(std::chrono::duration<double>(hold_));
-    const view::ServerCounts counts = server_.counts();
-    std::array<char, 200> line{};
-    std::snprintf(
-        line.data(), line.size(),
-        "view: %llu requests answered, %llu refused, %llu connections too many, %llu cut off; %llu moments dropped",
-        static_cast<unsigned long long>(counts.answered), static_cast<unsigned long long>(counts.refused),
-        static_cast<unsigned long long>(counts.crowded), static_cast<unsigned long long>(counts.cut_off),
-        static_cast<unsigned long long>(feed_.dropped()));
-    return line.data();
+    return view_.counts();
   }
 
  private:
   double hold_;
   ViewTruth truth_;
-  std::shared_ptr<view::FeatureTap> tap_ = std::make_shared<view::FeatureTap>();
+  EstimatorView view_;
   std::array<RecordedFrame, 2> frames_;  ///< the last ones: a frame is handed over after the next sample
-  std::vector<double> ranges_;
   std::optional<RealTimeClock> clock_;
-  view::Feed feed_;
-  view::Server server_;  ///< last: its threads read the feed
 };
 
 RunView::RunView(const RunViewArguments& args, const std::filesystem::path& recording, const Recording& opened)

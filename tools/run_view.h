@@ -9,22 +9,9 @@
 #include "src/odometry_factory.h"
 #include "src/recording/recording.h"
 #include "tools/replay.h"
-
-namespace CLI {  // NOLINT(readability-identifier-naming): the library's name
-class App;
-}
+#include "tools/view_options.h"
 
 namespace ear::tools {
-
-struct RunViewArguments {
-  int port = -1;  ///< below 0: no view
-  std::string address = "127.0.0.1";
-  std::string token;
-  bool real_time = false;
-  double hold = 0.0;  ///< [s] that it stays when the run has ended
-};
-
-void add_options(CLI::App& command, RunViewArguments& args);
 
 class RunView {
  public:

@@ -3,6 +3,8 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <cstdint>
+#include <vector>
 
 #include "ear/estimate.h"
 #include "ear/health.h"
@@ -60,10 +62,17 @@ struct BiasChanges {
   }
 };
 
+/// What became of a track that was tested: did it update the filter?
+struct TrackOutcome {
+  std::uint64_t id = 0;
+  bool used = false;
+};
+
 /// What the sources write while a frame is processed.
 struct Records {
   FrameStatistics statistics;
   InnovationLog log;
+  std::vector<TrackOutcome>* outcomes = nullptr;  ///< of this frame, for who asked: Estimator::report_tracks()
 };
 
 }  // namespace ear

@@ -1,5 +1,6 @@
 #include "src/live/live_estimator.h"
 
+#include <pthread.h>
 #include <time.h>
 
 #include <algorithm>
@@ -30,8 +31,8 @@ std::size_t sample_slots(const Calibration& calibration, const QueueCapacity& ca
 }  // namespace
 
 LiveEstimator::LiveEstimator(const Config& config, const Calibration& calibration, const QueueCapacity& capacity,
-                             LiveListeners listeners)
-    : queued_(config, calibration, capacity),
+                             LiveListeners listeners, MakeEstimator make)
+    : queued_(config, calibration, capacity, {}, std::move(make)),
       samples_(sample_slots(calibration, capacity), {}),
       listeners_(std::move(listeners)),
       steps_(!calibration.cameras.empty(), calibration.encoder.has_value()),
@@ -86,6 +87,7 @@ bool LiveEstimator::add_stereo(const StereoFrame& frame) {
 }
 
 void LiveEstimator::run() {
+  ::pthread_setname_np(::pthread_self(), "estimator");  // for top -H, and for who measures it
   while (true) {
     count_waiting();
     while (advance()) continue;
@@ -133,8 +135,9 @@ bool LiveEstimator::take_frame(TimeNs frame_ns) {
     if (*waited_ < kPatience) return false;
     ++impatient_;
   }
+  QueuedFrame* const keep = listeners_.keep_frame ? listeners_.keep_frame() : nullptr;
   std::optional<Estimate> estimate;
-  if (queued_.process(estimate) == Progress::no_frame) {
+  if (queued_.process(estimate, keep) == Progress::no_frame) {
     reached_ns_ = kNever;  // the stamp that reached it was a false one
     return false;
   }

@@ -33,17 +33,19 @@ struct LiveSample {
   std::optional<NavState> state;  ///< nothing before the start, lost, or after 2 s on inertia alone
 };
 
-/// Who is told; both are called by the estimator's thread, and hold it up as long as they take.
+/// Who is told, by the estimator's thread, which is held up as long as that takes; each may be empty.
 struct LiveListeners {
   std::function<void(const LiveFrame&, const Odometry&)> on_frame;
   std::function<void(const LiveSample&)> on_imu;
+  std::function<QueuedFrame*()> keep_frame =
+      {};  ///< before a frame: where it is to be kept, as QueuedOdometry::process
 };
 
 class LiveEstimator {
  public:
-  /// Begins. Throws as QueuedOdometry does.
+  /// Begins. `make` as for QueuedOdometry, which it throws as.
   LiveEstimator(const Config& config, const Calibration& calibration, const QueueCapacity& capacity,
-                LiveListeners listeners);
+                LiveListeners listeners, MakeEstimator make = {});
   ~LiveEstimator();  ///< as stop()
   LiveEstimator(const LiveEstimator&) = delete;
   LiveEstimator& operator=(const LiveEstimator&) = delete;

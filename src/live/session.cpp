@@ -49,16 +49,17 @@ std::string words_of(const PreflightItem& item) {
 }  // namespace
 
 Session::Session(const SessionOptions& options, const LiveSettings& settings, const Calibration& calibration,
-                 const std::filesystem::path& calibration_folder, RosNode* ros, Player* player)
+                 const std::filesystem::path& calibration_folder, RosNode* ros, Player* player, Onlooker onlooker)
     : options_(options),
       ros_(ros),
       player_(player),
+      onlooker_(std::move(onlooker)),
       files_(options.out),
       recorder_(options.record.empty() ? nullptr
                                        : std::make_unique<Recorder>(options.record, calibration, calibration_folder)),
       preflight_(options.check ? std::make_unique<Preflight>(calibration) : nullptr),
       estimator_(config_of(settings, calibration, options.check), calibration, {kQueueSeconds, settings.frame_slots},
-                 listeners()),
+                 listeners(), onlooker_.make),
       intake_(estimator_, calibration, clock_, taps()),
       lines_(std::make_unique<MavlinkLines>(lines_of(settings, player != nullptr), intake_)) {
   if (ros_ != nullptr) {
@@ -122,13 +123,15 @@ LiveListeners Session::listeners() {
             report_.take(frame, odometry);
             files_.take(frame);
             if (preflight_) preflight_->add(frame, odometry.calibration());
+            if (onlooker_.on_frame) onlooker_.on_frame(frame, odometry);
             send(frame);
             if (outputs_ != nullptr && ros_ != nullptr) ros_->show(odometry);
           },
           [this](const LiveSample& sample) {
             report_.take(sample);
             send(sample);
-          }};
+          },
+          onlooker_.keep_frame};
 }
 
 template <typename What>

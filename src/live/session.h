@@ -29,12 +29,19 @@ struct SessionOptions {
   bool check = false;            ///< by hand, before a flight: see Preflight
 };
 
+/// Who looks at what the estimator does, on its thread; each may be empty.
+struct Onlooker {
+  MakeEstimator make;                        ///< in place of the filter
+  std::function<QueuedFrame*()> keep_frame;  ///< as LiveListeners
+  std::function<void(const LiveFrame&, const Odometry&)> on_frame;
+};
+
 class Session {
  public:
   /// Opens sources and outputs, and begins to estimate. `ros` and `player` may be null, and must outlive it; a
   /// recording stands for all sensors. Throws InputError and std::runtime_error.
   Session(const SessionOptions& options, const LiveSettings& settings, const Calibration& calibration,
-          const std::filesystem::path& calibration_folder, RosNode* ros, Player* player);
+          const std::filesystem::path& calibration_folder, RosNode* ros, Player* player, Onlooker onlooker = {});
 
   /// Looks after all of it, until there is a reason to stop, which it returns. `wait` waits some 0.2 s for one from
   /// outside, such as a signal.
@@ -67,6 +74,7 @@ class Session {
   SessionOptions options_;
   RosNode* ros_;
   Player* player_;
+  Onlooker onlooker_;
   LiveClock clock_;
   LiveReport report_;
   EstimateFiles files_;

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "frontend/lens.h"
+#include "src/jpeg.h"
 #include "src/view/moment_text.h"
 #include "src/view/workers.h"
 

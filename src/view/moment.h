@@ -16,6 +16,9 @@
 
 namespace ear::view {
 
+/// What the estimator made of a feature when it last tested what was seen of it.
+enum class FeatureUse : std::uint8_t { none_yet, used, refused };
+
 /// A feature as the cameras see it.
 struct SeenFeature {
   std::uint64_t id = 0;
@@ -23,6 +26,8 @@ struct SeenFeature {
   Eigen::Vector2d right = Eigen::Vector2d::Zero();  ///< the same, where both cameras see it
   int age = 0;                                      ///< frames since it was seen first
   bool stereo = false;                              ///< seen by both cameras
+  FeatureUse use = FeatureUse::none_yet;
+  bool ended = false;  ///< it is not in this frame any more; this is where it was in the one before
 };
 
 /// One instant. All is copied but the images, which `pixels` keeps.

@@ -2,9 +2,6 @@
 
 #include <cmath>
 #include <nlohmann/json.hpp>
-#include <opencv2/core.hpp>
-#include <opencv2/imgcodecs.hpp>
-#include <opencv2/imgproc.hpp>
 #include <string>
 #include <vector>
 
@@ -15,7 +12,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr int kJpegQuality = 60;
+constexpr int kEnded = 4;  // above every FeatureUse
 
 /// Numbers that are none become null, as JSON has no others.
 Json number(double value, double scale = 1.0) {
@@ -117,29 +114,13 @@ std::string features_text(const Moment& moment, const Lens* left, const Lens* ri
   for (const SeenFeature& feature : moment.features) {
     const std::optional<Eigen::Vector2d> pixel = left != nullptr ? left->to_pixel(feature.left) : std::nullopt;
     if (!pixel) continue;
-    Json row{feature.id, feature.age};
+    Json row{feature.id, feature.age, static_cast<int>(feature.use) + (feature.ended ? kEnded : 0)};
     append(row, *pixel);
     const bool both = feature.stereo && right != nullptr;
     if (const auto other = both ? right->to_pixel(feature.right) : std::nullopt) append(row, *other);
     list.push_back(std::move(row));
   }
   return list.dump();
-}
-
-std::string jpeg(const ImageView& image, int most_width) {
-  if (image.empty()) return "";
-  // OpenCV has no view of constant pixels; nothing writes to these.
-  const cv::Mat view(image.height, image.width, CV_8UC1, const_cast<std::uint8_t*>(image.data),
-                     static_cast<std::size_t>(image.stride));
-  cv::Mat small = view;
-  if (image.width > most_width) {
-    const double scale = static_cast<double>(most_width) / image.width;
-    cv::resize(view, small, cv::Size(most_width, std::max(1, static_cast<int>(scale * image.height))), 0, 0,
-               cv::INTER_AREA);
-  }
-  std::vector<std::uint8_t> bytes;
-  if (!cv::imencode(".jpg", small, bytes, {cv::IMWRITE_JPEG_QUALITY, kJpegQuality})) return "";
-  return std::string(bytes.begin(), bytes.end());
 }
 
 std::string description_text(const Description& description) {

@@ -1,4 +1,4 @@
-// A moment as the page reads it: JSON, and the image as JPEG. docs/view.md has the fields.
+// A moment as the page reads it: JSON. docs/view.md has the fields.
 #pragma once
 
 #include <string>
@@ -11,12 +11,9 @@ namespace ear::view {
 /// The fields of a JSON object, without its braces: History adds the number.
 [[nodiscard]] std::string summary_text(const Moment& moment);
 
-/// A list of [id, age, x, y], x and y [px] in the left image, and behind them those in the right one where it was seen
-/// there. A feature without a pixel is left out.
+/// A list of [id, age, use, x, y]: use as FeatureUse has it, plus 4 where the feature has ended; x and y [px] in the
+/// left image, and behind them those in the right one where it was seen there. A feature without a pixel is left out.
 [[nodiscard]] std::string features_text(const Moment& moment, const Lens* left, const Lens* right);
-
-/// The image with at most `most_width` columns; empty where there is none or it cannot be encoded.
-[[nodiscard]] std::string jpeg(const ImageView& image, int most_width);
 
 /// What stays the same.
 [[nodiscard]] std::string description_text(const Description& description);

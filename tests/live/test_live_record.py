@@ -12,15 +12,15 @@ import os
 import re
 import subprocess
 import sys
-import tempfile
 import time
 import unittest
 from pathlib import Path
 
 import loopback
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "rosbag2"))
+sys.path[:0] = [str(Path(__file__).resolve().parents[1] / folder) for folder in ("rosbag2", "support")]
 import test_rosbag2 as bags  # takes the program and the folder from the arguments
+from temporary_folder import InTemporaryFolder
 
 os.environ["CYCLONEDDS_URI"] = loopback.URI
 
@@ -45,12 +45,10 @@ def vector(message):
     return [message["x"], message["y"], message["z"]]
 
 
-class LiveRecord(unittest.TestCase):
+class LiveRecord(InTemporaryFolder):
     @classmethod
     def setUpClass(cls):
-        cls.folder = tempfile.TemporaryDirectory()
-        cls.addClassCleanup(cls.folder.cleanup)
-        cls.work = Path(cls.folder.name)
+        super().setUpClass()
         cls.recording = cls.work / "recording"
         cls.mav0 = cls.recording / "mav0"
         cls.config = cls.work / "live.yaml"

@@ -12,11 +12,13 @@ import shutil
 import socket
 import subprocess
 import sys
-import tempfile
 import threading
 import time
 import unittest
 from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "support"))
+from temporary_folder import InTemporaryFolder
 
 PROGRAM = Path(sys.argv.pop(1)).resolve()
 SCRATCH = Path(sys.argv.pop(1)).resolve()
@@ -123,15 +125,14 @@ class FlightController:
         self.socket.close()
 
 
-class Stream(unittest.TestCase):
+class Stream(InTemporaryFolder):
     """One run at 15 frames a second, so that every other message is a predicted one."""
 
     @classmethod
     def setUpClass(cls):
-        cls.folder = tempfile.TemporaryDirectory()
-        cls.addClassCleanup(cls.folder.cleanup)
-        cls.recording = Path(cls.folder.name) / "recording"
-        output = Path(cls.folder.name) / "output"
+        super().setUpClass()
+        cls.recording = cls.work / "recording"
+        output = cls.work / "output"
         cls.ear("simulate", "flat1", "--seed", "5", "--duration", "5", "--camera-rate", "15", "--out", cls.recording)
         controller = FlightController()
         begin = time.monotonic()
@@ -278,7 +279,7 @@ class Stream(unittest.TestCase):
         self.assertIn("mavlink: %d odometry messages" % len(self.odometry), self.printed)
 
     def test_without_wheels_the_mounting_must_be_stated(self):
-        folder = Path(self.folder.name) / "wheelless/mav0"
+        folder = self.work / "wheelless/mav0"
         folder.mkdir(parents=True)
         for sensor in ("imu0", "cam0", "cam1"):
             (folder / sensor).symlink_to(self.recording / "mav0" / sensor)

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "filter/filter.h"
 #include "tests/support/skip.h"
@@ -26,13 +27,17 @@ struct Tally {
   int standing = 0;  ///< of these
   int flying = 0;
   int landings = 0;
-  int updates = 0;  ///< features that updated the filter
+  int updates = 0;   ///< features that updated the filter
+  int reported = 0;  ///< the same, by what became of each
   std::uint64_t allocations = 0;
   int allocating_frames = 0;  ///< frames, with the samples before them
 };
 
 Tally run(const simulator::Simulation& simulation, const FilterConfig& config) {
   Filter filter(config, simulation.calibration());
+  std::vector<TrackOutcome> outcomes;
+  outcomes.reserve(static_cast<std::size_t>(config.max_track_updates));
+  filter.report_tracks(&outcomes);
   Tally tally;
   bool flying = false;
   std::uint64_t before = tools::thread_allocations();
@@ -52,6 +57,7 @@ Tally run(const simulator::Simulation& simulation, const FilterConfig& config) {
     ++tally.frames;
     tally.standing += estimate->frame.standing ? 1 : 0;
     tally.updates += estimate->frame.features_used;
+    for (const TrackOutcome& outcome : outcomes) tally.reported += outcome.used ? 1 : 0;
     tally.landings += flying && estimate->frame.on_ground ? 1 : 0;
     flying = !estimate->frame.on_ground;
     tally.flying += flying ? 1 : 0;
@@ -71,6 +77,7 @@ void check(const Tally& tally) {
   CAPTURE(tally.allocating_frames);
   CHECK(tally.frames > 200);
   CHECK(tally.updates > 1000);
+  CHECK(tally.reported == tally.updates);
   CHECK(tally.allocations == 0);
 }
 

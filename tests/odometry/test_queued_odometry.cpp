@@ -1,6 +1,7 @@
 // Queues whose samples have false stamps: these delay no others.
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 
@@ -89,6 +90,40 @@ TEST_CASE("queues: one inertial stamp far ahead costs no frame, and the state at
   CHECK(odometry.odometry().input_counts().camera.far_ahead == 0);
   CHECK(estimates >= 16);
   CHECK(live > 200);
+}
+
+TEST_CASE("queues: a frame that was taken is handed on with its pixels, and later ones are as they came") {
+  simulator::Options options;
+  options.seed = 12;
+  options.duration = 2.0;
+  options.camera_rate_hz = 6.0;
+  const simulator::Film drive(options);
+  const Calibration& calibration = drive.simulation.calibration();
+  QueuedOdometry odometry(Config{}, calibration, {2.0, 1});  // one slot, which is used again
+  QueuedFrame kept = empty_frame(calibration.cameras);
+  const auto same = [](const ImageView& a, const ImageView& b) {
+    bool equal = a.width == b.width && a.height == b.height;
+    for (int row = 0; equal && row < a.height; ++row) {
+      equal = std::equal(a.data + row * a.stride, a.data + row * a.stride + a.width, b.data + row * b.stride);
+    }
+    return equal;
+  };
+  int frames = 0;
+  for (const simulator::Delivery& delivery : drive.simulation.deliveries()) {
+    if (delivery.stream == simulator::SensorStream::imu)
+      REQUIRE(odometry.add_imu(drive.simulation.imu()[delivery.index]));
+    if (delivery.stream != simulator::SensorStream::camera) continue;
+    const StereoFrame came = drive.frame(delivery.index);
+    REQUIRE(odometry.add_stereo(came));
+    std::optional<Estimate> estimate;
+    REQUIRE(odometry.process(estimate, ++frames % 3 == 0 ? nullptr : &kept) != Progress::no_frame);
+    if (frames % 3 == 0) continue;
+    const StereoFrame view = view_of(kept, calibration.cameras);
+    REQUIRE(view.t_ns == came.t_ns);
+    REQUIRE(same(view.left, came.left));
+    REQUIRE(same(view.right, came.right));
+  }
+  CHECK(frames > 8);
 }
 
 }  // namespace

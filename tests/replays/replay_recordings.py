@@ -72,7 +72,7 @@ def compare(name, expected, found):
 
 
 def read(reference):
-    runs = {}
+    runs, name = {}, ""
     for line in reference.read_text(encoding="utf-8").splitlines():
         if line.startswith("#") or not line:
             continue

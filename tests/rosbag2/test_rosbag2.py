@@ -16,10 +16,12 @@ import sqlite3
 import struct
 import subprocess
 import sys
-import tempfile
 import unittest
 import zlib
 from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "support"))
+from temporary_folder import InTemporaryFolder
 
 PROGRAM = Path(sys.argv.pop(1)).resolve()
 SCRATCH = Path(sys.argv.pop(1)).resolve()
@@ -108,12 +110,10 @@ def numbers(text, key):
     return [float(n) for n in re.search(key + r":.*?\[(.*?)\]", text, re.DOTALL)[1].split(",")]
 
 
-class Bags(unittest.TestCase):
+class Bags(InTemporaryFolder):
     @classmethod
     def setUpClass(cls):
-        cls.folder = tempfile.TemporaryDirectory()
-        cls.addClassCleanup(cls.folder.cleanup)
-        cls.work = Path(cls.folder.name)
+        super().setUpClass()
         cls.recording = cls.work / "recording"
         cls.mav0 = cls.recording / "mav0"
         cls.bag = cls.work / "ours.mcap"

@@ -2,9 +2,11 @@
 
 import subprocess
 import sys
-import tempfile
 import unittest
 from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "support"))
+from temporary_folder import InTemporaryFolder
 
 PROGRAM = Path(sys.argv.pop(1)).resolve()
 
@@ -17,12 +19,10 @@ def poses(run):
     return [[float(word) for word in line.split()] for line in (run / "estimate.tum").read_text().splitlines()]
 
 
-class Bags(unittest.TestCase):
+class Bags(InTemporaryFolder):
     @classmethod
     def setUpClass(cls):
-        cls.folder = tempfile.TemporaryDirectory()
-        cls.addClassCleanup(cls.folder.cleanup)
-        cls.work = Path(cls.folder.name)
+        super().setUpClass()
         cls.recording = cls.work / "recording"
         made = ear("simulate", "flat1", "--duration", "4", "--camera-rate", "10", "--out", cls.recording)
         assert made.returncode == 0, made

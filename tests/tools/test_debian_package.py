@@ -10,6 +10,9 @@ import tempfile
 import unittest
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "support"))
+from temporary_folder import InTemporaryFolder
+
 BUILD = Path(sys.argv.pop(1)).resolve()
 CPACK = sys.argv.pop(1)
 VERSION = sys.argv.pop(1)
@@ -19,14 +22,13 @@ def output_of(*command, **options):
     return subprocess.run([*map(str, command)], capture_output=True, text=True, check=True, **options).stdout
 
 
-class DebianPackage(unittest.TestCase):
+class DebianPackage(InTemporaryFolder):
     @classmethod
     def setUpClass(cls):
-        cls.folder = tempfile.TemporaryDirectory()
-        cls.addClassCleanup(cls.folder.cleanup)
-        output_of(CPACK, "-G", "DEB", "-B", cls.folder.name, cwd=BUILD)
-        (cls.package,) = Path(cls.folder.name).glob("ear-msckf_*.deb")
-        cls.python = next(Path(cls.folder.name).glob("python3-ear_*.deb"), None)
+        super().setUpClass()
+        output_of(CPACK, "-G", "DEB", "-B", cls.work, cwd=BUILD)
+        (cls.package,) = cls.work.glob("ear-msckf_*.deb")
+        cls.python = next(cls.work.glob("python3-ear_*.deb"), None)
 
     def field(self, name):
         return output_of("dpkg-deb", "--field", self.package, name).strip()

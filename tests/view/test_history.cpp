@@ -1,10 +1,10 @@
-// What the view keeps: bounded, numbered without gaps, the whole way in few points; and the features' ages.
+// What the view keeps: bounded, numbered without gaps, the whole way in few points.
 #include <doctest/doctest.h>
 
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "src/view/feature_tap.h"
+#include "src/jpeg.h"
 #include "src/view/history.h"
 #include "src/view/moment_text.h"
 
@@ -19,16 +19,6 @@ Entry entry(std::size_t bytes = 10) {
   e.features = std::make_shared<const std::string>("[]");
   e.image = std::make_shared<const std::string>(bytes, 'j');
   return e;
-}
-
-FeatureFrame frame_of(std::initializer_list<std::uint64_t> ids) {
-  FeatureFrame frame;
-  for (const std::uint64_t id : ids) {
-    FeatureObservation seen;
-    seen.id = id;
-    frame.features.push_back(seen);
-  }
-  return frame;
 }
 
 }  // namespace
@@ -77,16 +67,19 @@ TEST_CASE("history: the whole way stays within a number of points, in order, fro
   }
 }
 
-TEST_CASE("feature tap: a feature's age is the number of frames since it was seen first") {
-  FeatureTap tap;
-  tap.take(frame_of({7, 3}));
-  tap.take(frame_of({3, 9}));
-  tap.take(frame_of({9, 3, 7}));
-  REQUIRE(tap.features().size() == 3);
-  CHECK(tap.features()[0].id == 3);
-  CHECK(tap.features()[0].age == 2);
-  CHECK(tap.features()[1].age == 0);  // 7 was away: its number would not be used again, and if so it is new
-  CHECK(tap.features()[2].age == 1);
+TEST_CASE("features: what the filter made of each stands before its place, and those that ended are marked") {
+  CameraCalibration camera;
+  camera.width = 640;
+  camera.height = 480;
+  camera.fu = camera.fv = 400.0;
+  camera.cu = 320.0;
+  camera.cv = 240.0;
+  const Lens lens(camera);
+  Moment moment;
+  moment.features = {{5, {0.0, 0.0}, {-0.05, 0.0}, 12, true, FeatureUse::used, false},
+                     {6, {0.1, 0.1}, {0.0, 0.0}, 3, false, FeatureUse::refused, true}};
+  CHECK(nlohmann::json::parse(features_text(moment, &lens, &lens)) ==
+        nlohmann::json::parse("[[5,12,1,320.0,240.0,300.0,240.0],[6,3,6,360.0,280.0]]"));
 }
 
 TEST_CASE("moment: numbers that are none become null, and a moment without an estimate has no state") {

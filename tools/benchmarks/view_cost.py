@@ -1,7 +1,8 @@
 """What the view costs the estimator: view_cost.py EAR_PROGRAM RECORDING [ROUNDS]
 
-The processor time of the thread that estimates: as fast as it goes without a view; in real time with one that nobody looks at,
-and with one viewer who asks for all that the page asks for, ten times a second. Medians over the rounds.
+The processor time of the estimator's thread of `ear live`, which a recording feeds in real time: without a view, with one that
+nobody looks at, and with one viewer who asks for all that the page asks for, ten times a second. Medians over the rounds, which
+take three times as long as the recording each.
 """
 
 import json
@@ -10,30 +11,27 @@ import statistics
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 import urllib.request
 from pathlib import Path
 
 
-def thread_seconds(process):
-    try:
-        return int(Path(f"/proc/{process.pid}/task/{process.pid}/schedstat").read_text(encoding="ascii").split()[0]) * 1e-9
-    except (FileNotFoundError, ProcessLookupError, IndexError):
-        return None
-
-
-def run(program, recording, viewers, out):
-    """Milliseconds of processor time per frame; `viewers` None: no view."""
-    options = [] if viewers is None else ["--view", "0", "--real-time"]
-    process = subprocess.Popen([program, "run", recording, "--out", out, *options], stdout=subprocess.DEVNULL,
-                               stderr=subprocess.PIPE, text=True)
-    url = None if viewers is None else re.search(r"http\S+", process.stderr.readline())[0]
-    last, used = 0, 0.0
-    while process.poll() is None:
-        used = thread_seconds(process) or used
-        if not viewers:
-            time.sleep(0.002)
+def estimator_seconds(process):
+    """The time so far; nothing before and after the thread's life."""
+    for task in Path(f"/proc/{process.pid}/task").glob("*"):
+        try:
+            if (task / "comm").read_text(encoding="ascii").strip() == "estimator":
+                return int((task / "schedstat").read_text(encoding="ascii").split()[0]) * 1e-9
+        except (FileNotFoundError, ProcessLookupError, IndexError):
             continue
+    return None
+
+
+def look(url, process):
+    """As the page does it."""
+    last = 0
+    while process.poll() is None:
         try:
             moments = json.load(urllib.request.urlopen(f"{url}moments?viewer=a&n={last}", timeout=5))["moments"]
             if moments:
@@ -43,9 +41,28 @@ def run(program, recording, viewers, out):
         except OSError:
             pass  # it has ended: poll() says so
         time.sleep(0.1)
-    process.stderr.read()
-    counts = json.loads((out / "summary.json").read_text(encoding="utf-8"))["counts"]
-    return 1e3 * used / counts["frames"]
+
+
+def run(program, recording, viewers, folder):
+    """Milliseconds of processor time per frame; `viewers` None: no view."""
+    config = folder / "live.yaml"
+    config.write_text("budget_ms: 0\nframe_slots: 64\nlog: {level: info}\n", encoding="utf-8")
+    options = [] if viewers is None else ["--view", "0"]
+    process = subprocess.Popen([program, "live", "--sensors", recording, "--config", config, "--out", folder / "out", *options],
+                               stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    used = 0.0
+    for line in process.stderr:
+        found = re.search(r"view: (http\S+)", line)
+        if viewers and found:
+            threading.Thread(target=look, args=(found[1], process), daemon=True).start()
+        if "ready" in line:
+            break
+    threading.Thread(target=process.stderr.read, daemon=True).start()  # its pipe is not to fill
+    while process.poll() is None:
+        used = estimator_seconds(process) or used
+        time.sleep(0.02)
+    frames = len((folder / "out/estimate.tum").read_text(encoding="utf-8").splitlines())
+    return 1e3 * used / frames
 
 
 def main(program, recording, rounds=3):
@@ -53,8 +70,8 @@ def main(program, recording, rounds=3):
         found = {viewers: [] for viewers in (None, 0, 1)}
         for _ in range(rounds):
             for viewers, values in found.items():
-                values.append(run(program, recording, viewers, Path(folder) / "out"))
-    for viewers, name in ((None, "no view, as fast as it goes"), (0, "nobody looks"), (1, "one viewer")):
+                values.append(run(program, recording, viewers, Path(folder)))
+    for viewers, name in ((None, "no view"), (0, "nobody looks"), (1, "one viewer")):
         values = found[viewers]
         print(f"{name:28} {statistics.median(values):.3f} ms per frame ({min(values):.3f} to {max(values):.3f})")
 

@@ -10,6 +10,7 @@
 
 #include "tools/evaluation/plot.h"
 #include "tools/evaluation/report_page.h"
+#include "tools/evaluation/space_section.h"
 #include "tools/evaluation/summary.h"
 
 namespace ear::evaluation {
@@ -276,6 +277,22 @@ std::string trajectory_section(const Trajectory& truth, const std::vector<Report
                  "distance [m]", to_svg(above) + to_svg(aside));
 }
 
+std::string space_section() {
+  return section(
+      "In perspective",
+      "Drag to turn, or use the arrow keys; + and - zoom, Home goes back. Broad and pale: the truth. Dashed: in "
+      "the air. Numbers: the moments below.",
+      "", space_canvas());
+}
+
+std::string moments_section(const Trajectory& truth, const std::vector<ReportEntry>& entries,
+                            const std::vector<Moment>& moments) {
+  if (moments.empty()) return "";
+  const std::string whose = entries.size() > 1 ? " by " + escaped(entries.front().evaluation.name) : "";
+  return section("Moments", "What happened" + whose + ", and what the left camera saw then.", "",
+                 filmstrip(moments, truth.front().t_ns));
+}
+
 std::string position_section(const Trajectory& truth, const std::vector<ReportEntry>& entries, const Range& time) {
   const std::vector<std::string> labels{"x [m]", "y [m]", "z [m]"};
   std::vector<Plot> plots;
@@ -373,20 +390,25 @@ Range time_range(const Trajectory& truth, const std::vector<ReportEntry>& entrie
 
 }  // namespace
 
-std::string to_html(const std::string& title, const Trajectory& truth, const std::vector<ReportEntry>& entries) {
+std::string to_html(const std::string& title, const Trajectory& truth, const std::vector<ReportEntry>& entries,
+                    const std::vector<Moment>& moments) {
   std::vector<Evaluation> evaluations;
   evaluations.reserve(entries.size());
   for (const ReportEntry& entry : entries) evaluations.push_back(entry.evaluation);
+  std::vector<std::string> classes;
+  classes.reserve(entries.size());
+  for (std::size_t i = 0; i < entries.size(); ++i) classes.push_back(colour(i));
   const Range time = time_range(truth, entries);
 
   std::ostringstream page;
   page << "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n"
        << "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>" << escaped(title)
        << "</title>\n<style>" << kReportStyle << "</style></head>\n<body><main>\n<h1>" << escaped(title) << "</h1>\n"
-       << legend(entries) << table_section(evaluations) << trajectory_section(truth, entries)
-       << position_section(truth, entries, time) << rotation_section(truth, entries, time)
-       << nees_section(truth, entries, time) << drift_section(entries) << "</main><div id=\"readout\"></div>\n<script>"
-       << kReportScript << "</script></body></html>\n";
+       << legend(entries) << table_section(evaluations) << trajectory_section(truth, entries) << space_section()
+       << moments_section(truth, entries, moments) << position_section(truth, entries, time)
+       << rotation_section(truth, entries, time) << nees_section(truth, entries, time) << drift_section(entries)
+       << "</main><div id=\"readout\"></div>\n<script>" << kReportScript << space_data(truth, entries, classes, moments)
+       << perspective_script() << "</script></body></html>\n";
   return page.str();
 }
 

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "tools/evaluation/evaluate.h"
+#include "tools/evaluation/moments.h"
 
 namespace ear::evaluation {
 
@@ -14,8 +15,8 @@ struct ReportEntry {
   Evaluation evaluation;
 };
 
-/// The page. `title` names what was driven, e.g. the recording. `entries` is not empty.
+/// The page. `title` names what was driven, e.g. the recording. `entries` is not empty. `moments`: of the first entry.
 [[nodiscard]] std::string to_html(const std::string& title, const Trajectory& truth,
-                                  const std::vector<ReportEntry>& entries);
+                                  const std::vector<ReportEntry>& entries, const std::vector<Moment>& moments = {});
 
 }  // namespace ear::evaluation

@@ -7,7 +7,7 @@ namespace ear::evaluation {
 inline constexpr const char* kReportStyle = R"css(
 :root {
   color-scheme: light dark;
-  --page: #f6f7f9; --card: #ffffff; --ink: #1c2128; --soft: #5b6570; --rule: #dfe3e8; --grid: #eceff2; --good: #e6f4ec;
+  --page: #f6f7f9; --card: #ffffff; --ink: #1c2128; --soft: #5b6570; --rule: #dfe3e8; --line: var(--rule); --grid: #eceff2; --good: #e6f4ec;
   --truth: #1c2128; --consistent: #009e7322;
   --e0: #0072b2; --e1: #d55e00; --e2: #009e73; --e3: #b1579a; --e4: #b07800; --e5: #2f9fd8; --e6: #8a6d3b; --e7: #6b6f9c;
   --s0: #bfd9ec; --s1: #f7d9a8; --s2: #bfe3d5; --s3: #ecc7dc; --s4: #f4efb0; --s5: #d3d3ea; --s6: #f2c1b0; --s7: #d9dde1;
@@ -61,6 +61,13 @@ circle.start { fill: var(--card); stroke: var(--c); stroke-width: 2; } rect.end 
 .e0 { --c: var(--e0); } .e1 { --c: var(--e1); } .e2 { --c: var(--e2); } .e3 { --c: var(--e3); }
 .e4 { --c: var(--e4); } .e5 { --c: var(--e5); } .e6 { --c: var(--e6); } .e7 { --c: var(--e7); }
 .hidden { display: none; }
+#space { display: block; width: 100%; height: 420px; touch-action: pan-y; cursor: grab; }
+#space:focus-visible { outline: 3px solid var(--e0); outline-offset: 2px; }
+ol.film { list-style: none; counter-reset: film; display: grid; gap: 12px; padding: 0; margin: 0;
+          grid-template-columns: repeat(auto-fill, minmax(200px, 1fr)); }
+ol.film li { counter-increment: film; font-size: 13px; overflow-wrap: anywhere; }
+ol.film li::before { content: counter(film); font-weight: 600; margin-right: 6px; }
+ol.film img { display: block; width: 100%; border-radius: 4px; margin-bottom: 4px; }
 #readout { position: fixed; pointer-events: none; visibility: hidden; background: var(--card); color: var(--ink);
            border: 1px solid var(--rule); border-radius: 6px; padding: 5px 9px; font-size: 13px; z-index: 3;
            font-variant-numeric: tabular-nums; box-shadow: 0 2px 8px #0003; white-space: pre; }

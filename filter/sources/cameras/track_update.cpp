@@ -39,7 +39,9 @@ void TrackUpdate::update(const FeatureFrame& frame, bool oldest_goes, CameraUpda
   residuals_ = {};
   camera_poses(x, cameras_);
   for (const std::size_t i : selected_) {
-    ++(add(tracks[i], ekf) ? records.statistics.features_used : records.statistics.features_rejected);
+    const bool used = add(tracks[i], ekf);
+    ++(used ? records.statistics.features_used : records.statistics.features_rejected);
+    if (records.outcomes != nullptr) records.outcomes->push_back({tracks[i].id, used});
     tracks[i].observations.clear();  // each observation is used once
   }
   log(ekf, records);

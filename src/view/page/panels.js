@@ -1,7 +1,22 @@
 // Everything that is no path: image, figures, charts.
 const STAGES = ["pyramid", "track", "detect", "stereo", "reject", "filter"];
 const STAGE_COLOURS = ["#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00"];
-const camera = { image: null, features: [], n: 0, right: false };
+const USES = ["sky", "yellow", "red-bright"]; // not tested yet, used, refused: colour and shape
+const ENDED = 4;
+const camera = { image: null, features: [], n: 0, right: false, byAge: false };
+
+// Of a feature at the origin, so large: a square is not tested yet, a disc was used, a cross was refused.
+function mark(context, use, size) {
+  context.beginPath();
+  if (use === 0) context.rect(-0.9 * size, -0.9 * size, 1.8 * size, 1.8 * size);
+  else if (use === 1) context.arc(0, 0, size, 0, 2 * Math.PI);
+  else {
+    for (const side of [-1, 1]) {
+      context.moveTo(-size, -side * size);
+      context.lineTo(size, side * size);
+    }
+  }
+}
 
 function element(tag, text, className) {
   const made = document.createElement(tag);
@@ -24,13 +39,16 @@ function drawCamera(moment) {
   const [w, h] = model.about.cameras[camera.right ? 1 : 0];
   const scale = Math.min(width / w, height / h), left = (width - scale * w) / 2, top = (height - scale * h) / 2;
   context.drawImage(camera.image, left, top, scale * w, scale * h);
-  for (const [, frames, xLeft, yLeft, xRight, yRight] of camera.features) {
+  for (const [, frames, code, xLeft, yLeft, xRight, yRight] of camera.features) {
     const stereo = xRight !== undefined;
     if (camera.right && !stereo) continue;
     const [x, y] = camera.right ? [xRight, yRight] : [xLeft, yLeft];
-    const style = colour(frames >= 30 ? "yellow" : frames >= 5 ? "orange" : "sky");
-    context.beginPath();
-    context.arc(left + scale * (x + 0.5), top + scale * (y + 0.5), 2.8, 0, 2 * Math.PI);
+    const use = code % ENDED, oldness = frames >= 30 ? 2 : frames >= 5 ? 1 : 0;
+    const style = colour(camera.byAge ? ["sky", "orange", "yellow"][oldness] : USES[use]);
+    context.save();
+    context.translate(left + scale * (x + 0.5), top + scale * (y + 0.5));
+    if (code >= ENDED) context.globalAlpha = 0.5;
+    mark(context, use, 2 + 0.8 * oldness);
     context.lineWidth = 3;
     context.strokeStyle = "#000b";
     context.stroke();
@@ -38,7 +56,8 @@ function drawCamera(moment) {
     context.strokeStyle = style;
     context.stroke();
     context.fillStyle = style;
-    if (stereo) context.fill(); // a ring is seen by the left camera alone
+    if (stereo) context.fill(); // what is hollow is seen by the left camera alone
+    context.restore();
   }
   const s = moment.state;
   $("features").textContent = s ? `${s.tracks} features, ${s.stereo} by both cameras; ${s.used} used, ${s.rejected} not` : "";

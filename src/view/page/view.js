@@ -120,6 +120,13 @@ $("side").addEventListener("click", () => {
   $("which").textContent = camera.right ? "Right camera" : "Left camera";
   showImage();
 });
+$("tint").addEventListener("click", () => {
+  camera.byAge = !camera.byAge;
+  $("tint").setAttribute("aria-pressed", camera.byAge);
+  $("use-key").hidden = camera.byAge;
+  $("age-key").hidden = !camera.byAge;
+  redraw();
+});
 window.addEventListener("resize", redraw);
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
 follow();

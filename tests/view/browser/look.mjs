@@ -44,6 +44,11 @@ async function read(page) {
     features: await text("#features"), sources: await page.locator("#sources tr").count(), events: await text("#events") };
 }
 
+// How many features the page shows of each kind, those that ended included: not tested yet, used, refused.
+function uses(page) {
+  return page.evaluate(() => [0, 1, 2].map((use) => camera.features.filter((feature) => feature[2] % ENDED === use).length));
+}
+
 const pages = {};
 for (const [name, size] of Object.entries(SIZES)) pages[name] = await open(size);
 const shown = () => (document.body.dataset.t ? seconds(model.first, document.body.dataset.t) : 0);
@@ -52,7 +57,7 @@ while ((await pages.wide.evaluate(shown)) < Number(seconds)) await pages.wide.wa
 // By keyboard alone: what can be reached, the pause, the scrub bar.
 const { wide, narrow } = pages;
 seen.reached = [];
-for (let i = 0; i < 6; ++i) {
+for (let i = 0; i < 8; ++i) {
   await wide.keyboard.press("Tab");
   seen.reached.push(await wide.evaluate(() => document.activeElement.id));
 }
@@ -67,7 +72,12 @@ for (const canvas of ["above", "perspective"]) {
   seen.pixels[canvas] = {};
   for (const name of ["blue", "red", "truth", "orange", "pink"]) seen.pixels[canvas][name] = await coloured(wide, canvas, name);
 }
-seen.pixels.camera = (await coloured(wide, "camera", "sky")) + (await coloured(wide, "camera", "orange")) + (await coloured(wide, "camera", "yellow"));
+seen.uses = await uses(wide);
+for (const name of ["sky", "yellow"]) seen.pixels[name] = await coloured(wide, "camera", name);
+await wide.locator("#tint").click();
+await wide.waitForTimeout(200);
+seen.pixels.age = await coloured(wide, "camera", "orange");
+await wide.locator("#tint").click();
 seen.pixels.error = await coloured(wide, "error", "blue");
 for (const [name, page] of Object.entries(pages)) await page.screenshot({ path: `${folder}/${name}.png` });
 seen.overflow = await narrow.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth);
@@ -79,7 +89,7 @@ const left = await wide.locator("#camera").screenshot();
 await wide.locator("#side").click();
 await wide.waitForTimeout(500);
 seen.right = !left.equals(await wide.locator("#camera").screenshot());
-seen.pixels.right = await coloured(wide, "camera", "orange");
+seen.pixels.right = await coloured(wide, "camera", "yellow");
 await wide.locator("#side").click();
 
 // A part of the picture turns with the mouse.

@@ -1,14 +1,14 @@
+#include "tools/view_options.h"
+
 #include <algorithm>
 #include <cctype>
 #include <string>
 
 #include <CLI/CLI.hpp>
 
-#include "tools/run_view.h"
-
 namespace ear::tools {
 
-void add_options(CLI::App& command, RunViewArguments& args) {
+CLI::Option* add_view_options(CLI::App& command, ViewArguments& args) {
   constexpr int kLargestPort = 65535;
   CLI::Option* view =
       command.add_option("--view", args.port, "Show it in a browser: http://localhost:PORT (docs/view.md)")
@@ -27,6 +27,11 @@ void add_options(CLI::App& command, RunViewArguments& args) {
         const bool good = token.size() >= kShortest && std::all_of(token.begin(), token.end(), fits);
         return good ? std::string() : std::string("at least 8 letters, digits, - and _");
       });
+  return view;
+}
+
+void add_options(CLI::App& command, RunViewArguments& args) {
+  CLI::Option* const view = add_view_options(command, args.server);
   command.add_option("--view-hold", args.hold, "How long the view stays when the recording has ended [s]")
       ->needs(view)
       ->check(CLI::NonNegativeNumber);
