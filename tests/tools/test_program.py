@@ -65,7 +65,8 @@ class CommandLine(unittest.TestCase):
         environment = {**os.environ, "EAR_KERNELS": first}
         self.assertIn(f"kernels: {first} (", ear("--version", environment=environment).stdout)
         environment["EAR_KERNELS"] = "mmx"
-        self.assert_refused(ear("bench", ".", environment=environment), 'EAR_KERNELS: no kernels are called "mmx"')
+        for command in (("bench", "."), ("live", "--sensors", ".")):
+            self.assert_refused(ear(*command, environment=environment), 'EAR_KERNELS: no kernels are called "mmx"')
 
     def test_no_arguments(self):
         self.assert_refused(ear(), "subcommand")
