@@ -138,23 +138,22 @@ class Program:
 
 def count_emulated(program, sysroot, patterns):
     """Per pattern: calls and instructions of the functions that match, each with all that it calls."""
-    wanted = [(pattern, address) for pattern in patterns for name, addresses in program.functions.items()
-              if re.match(pattern, name) for address in addresses]
+    matching = {pattern: {address for name, addresses in program.functions.items() if re.match(pattern, name)
+                          for address in addresses} for pattern in patterns}
+    wanted = sorted(set().union(*matching.values()))
     with tempfile.TemporaryDirectory() as folder:
         plugin = Path(folder) / "libcount.so"
         source = Path(__file__).with_name("count_instructions.c")
         subprocess.run(["cc", "-O2", "-shared", "-fPIC", "-fvisibility=hidden", "-o", plugin, source], check=True)
-        arguments = ",".join([str(plugin), f"code={program.code}", *(f"function={address}" for _, address in wanted)])
+        arguments = ",".join([str(plugin), f"code={program.code}", *(f"function={address}" for address in wanted)])
         done = subprocess.run([f"qemu-{program.machine}", "-L", sysroot, "-plugin", arguments, "-d", "plugin",
                                program.file], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, check=True)
     if not re.search(r"^all \d+ unfinished 0$", done.stderr, re.MULTILINE):
         sys.exit(f"{program.file}: calls that did not return: {done.stderr[-200:]}")
-    counted = {pattern: [0, 0] for pattern in patterns}
-    for index, calls, instructions in re.findall(r"^(\d+) (\d+) (\d+)$", done.stderr, re.MULTILINE):
-        sums = counted[wanted[int(index)][0]]
-        sums[0] += int(calls)
-        sums[1] += int(instructions)
-    return counted
+    lines = re.findall(r"^(\d+) (\d+) (\d+)$", done.stderr, re.MULTILINE)
+    counted = {wanted[int(index)]: (int(calls), int(instructions)) for index, calls, instructions in lines}
+    return {pattern: [sum(counted[address][k] for address in addresses) for k in (0, 1)]
+            for pattern, addresses in matching.items()}
 
 
 def count_build(build, sysroot):
