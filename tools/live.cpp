@@ -15,6 +15,7 @@
 #include "tools/commands.h"
 #include "tools/live_view.h"
 #include "tools/opened_recording.h"
+#include "tools/program_config.h"
 
 namespace ear::tools {
 namespace {
@@ -48,10 +49,14 @@ class StopSignals {
 };
 
 live::LiveSettings settings_of(const LiveArguments& args) {
-  if (!args.config.empty()) return live::load_live_settings(args.config);
   live::LiveSettings settings;
-  settings.file = "ear live";
-  settings.log.level = LogLevel::info;
+  if (args.config.empty()) {
+    settings.file = "ear live";
+    settings.log.level = LogLevel::info;
+  } else {
+    settings = live::load_live_settings(args.config);
+  }
+  settings.estimator = with_environment(settings.estimator);
   return settings;
 }
 

@@ -1,96 +1,32 @@
 #include "filter/ekf/covariance.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cassert>
 
 namespace ear {
 namespace {
 
-// Measurements of few rows (wheels, lasers, standstill) are the most frequent. Eigen's blocked products then mostly
-// arrange their blocks: plain sums over whole columns cost a third.
-constexpr int kFewRows = 12;
+constexpr int kGroup = 4;  // rows that are summed up at a time
 
-/// result = P H^T, the columns of H that are zero left out.
-template <typename Block, typename Result>
-void multiply_few(const Block& P, const Eigen::Ref<const Eigen::MatrixXd>& H, Result& result) {
-  result.setZero();
-  for (Eigen::Index j = 0; j < H.cols(); ++j) {
-    for (Eigen::Index k = 0; k < H.rows(); ++k) {
-      if (H(k, j) != 0.0) result.col(k) += H(k, j) * P.col(j);
-    }
-  }
-}
-
-/// Y = Y L^-T for a lower triangular L.
-template <typename Matrix>
-void solve_few(const Eigen::Ref<const Eigen::MatrixXd>& L, Matrix& Y) {
-  for (Eigen::Index k = 0; k < Y.cols(); ++k) {
-    for (Eigen::Index l = 0; l < k; ++l) Y.col(k) -= L(k, l) * Y.col(l);
-    Y.col(k) /= L(k, k);
-  }
-}
-
-/// P - Y Y^T in the place of P's lower triangle, for the columns of Y from `first` on.
-template <int columns, typename Matrix, typename Symmetric>
-void subtract_square(const Matrix& Y, Eigen::Index first, Symmetric& P) {
-  const Eigen::Index n = P.rows();
-  for (Eigen::Index j = 0; j < n; ++j) {
-    const auto term = [&](Eigen::Index k) { return Y(j, first + k) * Y.col(first + k).tail(n - j); };
-    auto below = P.col(j).tail(n - j);
-    if constexpr (columns == 4) below -= (term(0) + term(1)) + (term(2) + term(3));
-    if constexpr (columns == 3) below -= term(0) + term(1) + term(2);
-    if constexpr (columns == 2) below -= term(0) + term(1);
-    if constexpr (columns == 1) below -= term(0);
-  }
-}
-
-template <typename Matrix, typename Symmetric>
-void subtract_square_of_few(const Matrix& Y, Symmetric& P) {
-  Eigen::Index k = 0;
-  for (; k + 4 <= Y.cols(); k += 4) subtract_square<4>(Y, k, P);
-  switch (Y.cols() - k) {
-    case 3:
-      return subtract_square<3>(Y, k, P);
-    case 2:
-      return subtract_square<2>(Y, k, P);
-    case 1:
-      return subtract_square<1>(Y, k, P);
-    default:
-      return;
-  }
-}
-
-/// Writes the lower triangle above the diagonal, in blocks: their rows are far apart in memory. A block by way of a
-/// matrix of its own goes through registers.
-template <typename Symmetric>
-void mirror_lower(Symmetric& P) {
-  constexpr int b = 4;
-  const Eigen::Index n = P.rows();
-  const Eigen::Index whole = n - n % b;
-  for (Eigen::Index j = 0; j < whole; j += b) {
-    for (Eigen::Index i = j + b; i < whole; i += b) {
-      const Eigen::Matrix<double, b, b> below = P.template block<b, b>(i, j);
-      P.template block<b, b>(j, i) = below.transpose();
-    }
-    P.template block<b, b>(j, j).template triangularView<Eigen::StrictlyUpper>() =
-        P.template block<b, b>(j, j).transpose();
-  }
-  for (Eigen::Index i = whole; i < n; ++i) P.col(i).head(i) = P.row(i).head(i).transpose();
-}
+ConstMatrix readable(const Eigen::MatrixXd& M) { return {M.data(), M.outerStride()}; }
+MutableMatrix writable(Eigen::MatrixXd& M) { return {M.data(), M.outerStride()}; }
 
 }  // namespace
 
-Covariance::Covariance(int capacity)
-    : P_(Eigen::MatrixXd::Zero(capacity, capacity)),
-      PHt_(capacity, capacity),
-      S_(capacity, capacity),
+Covariance::Covariance(int capacity, Kernels kernels)
+    : kernels_(filter_kernels(kernels)),
+      P_(Eigen::MatrixXd::Zero(stride_for(capacity), rounded_up(capacity))),
+      Ht_(Eigen::MatrixXd::Zero(stride_for(capacity), capacity)),
+      PHt_(Eigen::MatrixXd::Zero(stride_for(capacity + kGroup), capacity)),
+      S_(Eigen::MatrixXd::Zero(stride_for(capacity), capacity)),
       considered_(err::calibration_size, err::calibration_size),
       whitened_(capacity),
-      correction_(capacity) {}
+      correction_(capacity) {
+  seen_.reserve(static_cast<std::size_t>(capacity));
+}
 
 void Covariance::reset(const Eigen::VectorXd& sigma) {
-  assert(sigma.size() <= P_.rows());
+  assert(sigma.size() <= P_.cols());
   size_ = static_cast<int>(sigma.size());
   P_.topLeftCorner(size_, size_).setZero();
   P_.topLeftCorner(size_, size_).diagonal() = sigma.cwiseAbs2();
@@ -103,7 +39,7 @@ void Covariance::propagate(const ErrorTransition& transition, const Eigen::Matri
   constexpr int n = err::normal + 2;  // what changes
   const Eigen::Matrix<double, 3, 2> gyro_to_normal = -transition.Phi.block<3, 3>(err::theta, err::b_g).transpose() * B;
   const auto carry = [&](auto& M) {
-    carry_columns(transition.Phi, M);
+    kernels_.carry(transition.Phi.data(), static_cast<int>(M.rows()), {M.data(), M.outerStride()});
     M.template middleCols<2>(err::normal).noalias() += M.template middleCols<3>(err::b_g).lazyProduct(gyro_to_normal);
   };
   auto P = P_.topLeftCorner(size_, size_);
@@ -145,10 +81,10 @@ double Covariance::variance_of_row(const Eigen::Ref<const Eigen::RowVectorXd>& h
 
 void Covariance::append_clone(const Eigen::Matrix<double, 6, err::imu_size>& J_clone_imu,
                               const Eigen::Matrix<double, 6, 1>& J_clone_offset) {
-  assert(size_ + err::clone_size <= P_.rows());
+  assert(size_ + err::clone_size <= P_.cols());
   const int n = size_;
   auto rows = P_.block(n, 0, 6, n);
-  rows.noalias() = J_clone_imu * P_.topRows(err::imu_size).leftCols(n);
+  rows.noalias() = J_clone_imu * P_.topLeftCorner(err::imu_size, n);
   rows.noalias() += J_clone_offset * P_.row(err::time_offset).leftCols(n);
   P_.block(0, n, n, 6) = rows.transpose();
   Eigen::Matrix<double, 6, 6> corner = rows.leftCols<err::imu_size>() * J_clone_imu.transpose();
@@ -174,43 +110,39 @@ Eigen::Ref<const Eigen::VectorXd> Covariance::update(const Eigen::Ref<const Eige
                                                      const Eigen::Ref<const Eigen::VectorXd>& residual,
                                                      int considered_first, int considered_count) {
   const int n = size_;
-  const auto m = H.rows();
-  assert(m <= PHt_.cols() && first_column + H.cols() <= n);
-  auto P = P_.topLeftCorner(n, n);
-  auto PHt = PHt_.topLeftCorner(n, m);
-  auto S = S_.topLeftCorner(m, m);
-  auto z = whitened_.head(m);
-  const bool few = m <= kFewRows;
-
-  const auto P_seen = P.middleCols(first_column, H.cols());
-  if (few) {
-    multiply_few(P_seen, H, PHt);
-  } else {
-    PHt.noalias() = P_seen * H.transpose();
-  }
-  S.triangularView<Eigen::Lower>() = H * PHt.middleRows(first_column, H.cols());  // the other is not read
-  S.diagonal().array() += 1.0;
+  const auto m = static_cast<int>(H.rows());
+  const auto columns = static_cast<int>(H.cols());
+  assert(m <= PHt_.cols() && first_column + columns <= n);
   auto correction = correction_.head(n);
   correction.setZero();
-  Eigen::Ref<Eigen::MatrixXd> factor = S;
-  const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> llt(factor);  // in place
-  if (llt.info() != Eigen::Success || !residual.allFinite() || !H.allFinite()) return correction;
+  if (!residual.allFinite() || !H.allFinite()) return correction;
+  const int padded = (columns + kGroup - 1) / kGroup * kGroup;
+  Ht_.topLeftCorner(columns, m) = H.transpose();
+  Ht_.block(columns, 0, padded - columns, m).setZero();
+  seen_.clear();
+  for (int k = 0; k < columns; ++k) {
+    if (!(Ht_.row(k).head(m).array() == 0.0).all()) seen_.push_back(k);
+  }
+
+  const ConstMatrix P_seen{P_.col(first_column).data(), P_.outerStride()};
+  kernels_.multiply(P_seen, readable(Ht_), seen_.data(), static_cast<int>(seen_.size()), n, m, writable(PHt_));
+  PHt_.block(n, 0, std::max(rounded_up(n) - n, kGroup), m).setZero();
+  auto S = S_.topLeftCorner(m, m);
+  const ConstMatrix PHt_seen{PHt_.data() + first_column, PHt_.outerStride()};
+  kernels_.multiply_transposed(readable(Ht_), PHt_seen, padded, m, writable(S_));  // the other triangle is not read
+  S.diagonal().array() += 1.0;
+  auto z = whitened_.head(m);
   z = residual;
-  llt.matrixL().solveInPlace(z);
+  if (!kernels_.factorize(writable(S_), m, z.data())) return correction;
   // Y = P H^T L^-T, in the place of P H^T, so that P H^T S^-1 H P = Y Y^T
   const auto c = considered_count;
-  considered_.topLeftCorner(c, c) = P.block(considered_first, considered_first, c, c);
-  if (few) {
-    solve_few(factor, PHt);
-    subtract_square_of_few(PHt, P);
-  } else {
-    llt.matrixU().solveInPlace<Eigen::OnTheRight>(PHt);
-    P.selfadjointView<Eigen::Lower>().rankUpdate(PHt, -1.0);
-  }
-  mirror_lower(P);
-  P.block(considered_first, considered_first, c, c) = considered_.topLeftCorner(c, c);
+  auto P_considered = P_.block(considered_first, considered_first, c, c);
+  considered_.topLeftCorner(c, c) = P_considered;
+  kernels_.solve(readable(S_), n, m, writable(PHt_));
+  kernels_.subtract_square(readable(PHt_), m, n, writable(P_));
+  P_considered = considered_.topLeftCorner(c, c);
 
-  correction.noalias() = PHt * z;
+  correction.noalias() = PHt_.topLeftCorner(n, m) * z;
   correction.segment(considered_first, c).setZero();
   return correction;
 }

@@ -2,16 +2,18 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <vector>
 
 #include "filter/ekf/propagation.h"
+#include "filter/kernels/filter_kernels.h"
 
 namespace ear {
 
 /// Symmetric matrix of the error vector (state.h). All memory is taken at construction.
 class Covariance {
  public:
-  /// `capacity`: the largest error vector that will ever be.
-  explicit Covariance(int capacity);
+  /// `capacity`: the largest error vector that will ever be. All kernels give the same bits.
+  explicit Covariance(int capacity, Kernels kernels = Kernels::best);
 
   /// Diagonal matrix of `size` standard deviations squared.
   void reset(const Eigen::VectorXd& sigma);
@@ -56,10 +58,12 @@ class Covariance {
  private:
   [[nodiscard]] double variance_of_row(const Eigen::Ref<const Eigen::RowVectorXd>& h, int first_column) const;
 
-  Eigen::MatrixXd P_;
+  FilterKernels kernels_;
+  Eigen::MatrixXd P_;  ///< with rows and columns beyond `capacity`, for the kernels
   int size_ = 0;
-  Eigen::MatrixXd PHt_, S_, considered_;
+  Eigen::MatrixXd Ht_, PHt_, S_, considered_;
   Eigen::VectorXd whitened_, correction_;
+  std::vector<int> seen_;  ///< columns of H that are not zero
 };
 
 }  // namespace ear

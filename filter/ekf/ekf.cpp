@@ -20,7 +20,8 @@ Ekf::Ekf(const FilterConfig& config, const Calibration& calibration)
       normal_prior_(config.odometer.normal_prior),
       wheel_apart_(std::sqrt(2.0) * config.prior.wheel_apart),
       gate_(config.gate_probability, 4 * (config.window + 1)),
-      covariance_(error_capacity(config)) {
+      kernels_(filter_kernels(config.kernels)),
+      covariance_(error_capacity(config), config.kernels) {
   state_.clones.reserve(static_cast<std::size_t>(config.window) + 1);
   reset();
 }
@@ -68,7 +69,7 @@ std::optional<TimeNs> Ekf::propagate(const ImuBuffer& samples, TimeNs t_ns, cons
           uncertain_ns = state_.imu.t_ns;
         const ErrorTransition step = error_transition(state_.imu, gyro_B, accel_B, dt, noise);
         if (total) {
-          chain(*total, step);
+          chain(kernels_, *total, step);
         } else {
           total = step;
         }
@@ -161,10 +162,14 @@ bool Ekf::possible() const {
 /// distance and velocity longer alike.
 ImuErrorMatrix Ekf::ordinary_covariance(double scale_sigma) const {
   const ImuState& x = state_.imu;
-  ImuErrorMatrix T = ImuErrorMatrix::Identity();
-  T.block<3, 3>(estimate_error::velocity, err::theta) = -skew(x.v_W);
-  T.block<3, 3>(estimate_error::position, err::theta) = -skew(x.p_WB);
-  ImuErrorMatrix P = T * covariance_.matrix().topLeftCorner<err::imu_size, err::imu_size>() * T.transpose();
+  ImuErrorMatrix P = covariance_.matrix().topLeftCorner<err::imu_size, err::imu_size>();
+  const auto subtract = [&P](int entry, const Eigen::Vector3d& by_rotation) {
+    const Eigen::Matrix3d J = skew(by_rotation);
+    P.middleRows<3>(entry) -= J.lazyProduct(P.middleRows<3>(err::theta));
+    P.middleCols<3>(entry) -= P.middleCols<3>(err::theta).lazyProduct(J.transpose());
+  };
+  subtract(estimate_error::velocity, x.v_W);
+  subtract(estimate_error::position, x.p_WB);
   if (!(scale_sigma > 0.0)) return P;
   Eigen::Matrix<double, err::imu_size, 1> J = Eigen::Matrix<double, err::imu_size, 1>::Zero();
   J.segment<3>(estimate_error::velocity) = x.v_W;

@@ -13,6 +13,7 @@
 #include "filter/ekf/records.h"
 #include "filter/ekf/state.h"
 #include "filter/ingest/imu_buffer.h"
+#include "filter/kernels/filter_kernels.h"
 
 namespace ear {
 
@@ -111,6 +112,7 @@ class Ekf {
   double normal_prior_;  ///< [rad]
   double wheel_apart_;   ///< of the difference of the wheel radii, relative
   Gate gate_;
+  FilterKernels kernels_;
   bool running_ = false;
   State state_;
   Covariance covariance_;

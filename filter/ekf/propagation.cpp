@@ -78,21 +78,26 @@ ErrorTransition error_transition(const ImuState& x, const Eigen::Vector3d& gyro_
   step.Phi.block<9, 3>(err::theta, err::b_a) = B_accel;
 
   // White noise of density s has the variance s^2 / dt in a mean over dt; it enters where a bias would.
-  step.Q.topLeftCorner<9, 9>() = B_gyro * (noise.gyro_noise * noise.gyro_noise / dt) * B_gyro.transpose() +
-                                 B_accel * (noise.accel_noise * noise.accel_noise / dt) * B_accel.transpose();
+  const Eigen::Matrix<double, 9, 3> gyro_share = B_gyro * (noise.gyro_noise * noise.gyro_noise / dt);
+  const Eigen::Matrix<double, 6, 3> accel_share =
+      B_accel.bottomRows<6>() * (noise.accel_noise * noise.accel_noise / dt);
+  step.Q.topLeftCorner<9, 9>() = gyro_share.lazyProduct(B_gyro.transpose());
+  step.Q.block<6, 6>(err::nu, err::nu) += accel_share.lazyProduct(B_accel.bottomRows<6>().transpose());
   step.Q.diagonal().segment<3>(err::b_g).setConstant(noise.gyro_random_walk * noise.gyro_random_walk * dt);
   step.Q.diagonal().segment<3>(err::b_a).setConstant(noise.accel_random_walk * noise.accel_random_walk * dt);
   return step;
 }
 
-void chain(ErrorTransition& total, const ErrorTransition& step) {
-  carry_columns(step.Phi, total.Q);
-  total.Q.transposeInPlace();
-  carry_columns(step.Phi, total.Q);
+void chain(const FilterKernels& kernels, ErrorTransition& total, const ErrorTransition& step) {
+  const auto carry = [&](ImuErrorMatrix& M) {
+    kernels.carry(step.Phi.data(), err::imu_size, {M.data(), err::imu_size});
+    M.transposeInPlace();
+  };
+  carry(total.Q);
+  kernels.carry(step.Phi.data(), err::imu_size, {total.Q.data(), err::imu_size});  // symmetric
   total.Q += step.Q;
   total.Phi.transposeInPlace();
-  carry_columns(step.Phi, total.Phi);
-  total.Phi.transposeInPlace();
+  carry(total.Phi);
 }
 
 }  // namespace ear

@@ -7,13 +7,14 @@
 #include "ear/estimate.h"
 #include "filter/ekf/state.h"
 #include "filter/ingest/imu_buffer.h"
+#include "filter/kernels/filter_kernels.h"
 
 namespace ear {
 
 using ImuErrorMatrix = Eigen::Matrix<double, err::imu_size, err::imu_size>;
 
 /// An error over an interval: x_end = Phi x_start + w, cov(w) = Q. Intervals chain. Of Phi only the blocks that
-/// carry_columns() names differ from those of the identity matrix.
+/// FilterKernels::carry() looks at differ from those of the identity matrix.
 struct ErrorTransition {
   ImuErrorMatrix Phi = ImuErrorMatrix::Identity();
   ImuErrorMatrix Q = ImuErrorMatrix::Zero();
@@ -46,20 +47,6 @@ struct BodyMotion {
 [[nodiscard]] ErrorTransition error_transition(const ImuState& x, const Eigen::Vector3d& gyro_B,
                                                const Eigen::Vector3d& accel_B, double dt, const ImuCalibration& noise);
 
-/// M Phi^T in the place of M, of which the first columns belong to the inertial errors: the biases' stay. With M = P
-/// this is one half of Phi P Phi^T; the products are those of 3 x 3 blocks that are not zero.
-template <typename Matrix>
-void carry_columns(const ImuErrorMatrix& Phi, Eigen::MatrixBase<Matrix>& M) {
-  const auto add = [&](int to, int from) {
-    for (int j = to; j < to + 3; ++j) {
-      M.col(j) += Phi(j, from) * M.col(from) + Phi(j, from + 1) * M.col(from + 1) + Phi(j, from + 2) * M.col(from + 2);
-    }
-  };
-  for (const int from : {err::theta, err::nu, err::b_g, err::b_a}) add(err::rho, from);
-  for (const int from : {err::theta, err::b_g, err::b_a}) add(err::nu, from);
-  add(err::theta, err::b_g);
-}
-
 /// The noise of samples that are less certain than usual.
 [[nodiscard]] inline ImuCalibration with_factors(ImuCalibration imu, const ImuNoiseFactors& factors) {
   imu.gyro_noise *= factors.gyro;
@@ -68,6 +55,6 @@ void carry_columns(const ImuErrorMatrix& Phi, Eigen::MatrixBase<Matrix>& M) {
 }
 
 /// `total` followed by `step`.
-void chain(ErrorTransition& total, const ErrorTransition& step);
+void chain(const FilterKernels& kernels, ErrorTransition& total, const ErrorTransition& step);
 
 }  // namespace ear

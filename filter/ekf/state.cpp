@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "filter/ekf/turn_between.h"
+
 namespace ear {
 namespace {
 
@@ -31,7 +33,7 @@ Eigen::Matrix<double, 6, 1> local_difference(const Pose& truth, const Pose& esti
 
 /// The shortest rotation vector that turns unit vector a into unit vector b.
 Eigen::Vector3d rotation_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
-  return log_so3(Eigen::Quaterniond::FromTwoVectors(a, b).toRotationMatrix());
+  return log_so3(turn_between(a, b));
 }
 
 }  // namespace

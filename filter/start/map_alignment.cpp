@@ -38,6 +38,8 @@ Eigen::Matrix<double, estimate_error::size, estimate_error::size> MapAlignment::
     const Eigen::Matrix<double, estimate_error::size, estimate_error::size>& covariance_A,
     const NavState& state_A) const {
   namespace at = estimate_error;
+  const bool same = q_WA.vec().isZero(0.0) && yaw_sigma == 0.0 && position_sigma == 0.0;
+  if (same) return covariance_A;
   const Eigen::Matrix3d R = q_WA.toRotationMatrix();
   Eigen::Matrix<double, at::size, at::size> T = Eigen::Matrix<double, at::size, at::size>::Identity();
   for (const int block : {at::rotation, at::velocity, at::position}) T.block<3, 3>(block, block) = R;

@@ -1,10 +1,10 @@
 #include "filter/start/moving_start.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
 #include "filter/ekf/so3.h"
+#include "filter/ekf/turn_between.h"
 #include "filter/start/known_gravity.h"
 
 namespace ear {
@@ -143,7 +143,7 @@ std::optional<ImuState> MovingStart::solve(const ImuBuffer& imu) const {
   }
 
   // Gravity as the cameras alone see it must have about its known size.
-  const Vector unbound = A.ldlt().solve(b);
+  const Vector unbound = solve_symmetric(A, b);
   const double miss = std::abs(unbound.segment<3>(kG).norm() + kGravity_W.z());
   if (!(miss < kWorstGravity)) return std::nullopt;
   const Vector x = solve_with_known_gravity(A, b, kG);
@@ -153,7 +153,7 @@ std::optional<ImuState> MovingStart::solve(const ImuBuffer& imu) const {
 
   ImuState state;
   state.t_ns = start_ns;
-  state.R_WB = Eigen::Quaterniond::FromTwoVectors(x.segment<3>(kG), kGravity_W).toRotationMatrix();
+  state.R_WB = turn_between(x.segment<3>(kG), kGravity_W);
   state.v_W = state.R_WB * x.segment<3>(kV);
   state.b_g = b_g;
   state.b_a = x.segment<3>(kBa);

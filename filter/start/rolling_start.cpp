@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "filter/ekf/so3.h"
+#include "filter/ekf/turn_between.h"
 #include "filter/start/known_gravity.h"
 
 namespace ear {
@@ -89,7 +91,7 @@ std::optional<ImuState> rolling_start(const ImuBuffer& imu, const Ring<WheelIncr
 
   ImuState state;
   state.t_ns = start_ns;
-  state.R_WB = Eigen::Quaterniond::FromTwoVectors(x.segment<3>(kG), kGravity_W).toRotationMatrix();
+  state.R_WB = turn_between(x.segment<3>(kG), kGravity_W);
   state.v_W = state.R_WB * x.segment<3>(kV);
   state.b_g = x.segment<3>(kBg);
   state.b_a = x.segment<3>(kBa);

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "filter/ekf/initial_state.h"
+#include "filter/ekf/turn_between.h"
 #include "filter/ingest/stamp_guard.h"
 #include "filter/start/rolling_start.h"
 
@@ -162,7 +163,7 @@ std::optional<StartState> Start::standing(TimeNs t_ns, const ImuStatistics& imu)
   StartState start;
   ImuState& x = start.x;
   x.t_ns = t_ns;
-  x.R_WB = Eigen::Quaterniond::FromTwoVectors(imu.accel_mean, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  x.R_WB = turn_between(imu.accel_mean, Eigen::Vector3d::UnitZ());
   x.b_g = imu.gyro_mean;
   start.sigma = sigma();
   // What the force measures beyond gravity's known size can only be bias.

@@ -3,6 +3,8 @@
 
 #include <cstdint>
 
+#include "ear/kernels.h"
+
 namespace ear {
 
 /// How the filter recognises that the vehicle stands, and how firmly it then holds the pose.
@@ -132,6 +134,7 @@ struct FilterConfig {
   ContactConfig contact;
   ImpactConfig impact;
   AnomalyConfig anomaly;
+  Kernels kernels = Kernels::best;  ///< another choice is for tests and comparisons, or the next best; not in files
 };
 
 }  // namespace ear

@@ -92,7 +92,7 @@ TEST_CASE("propagation: Q is the covariance of many noisy integrations") {
   ImuState mean = start;
   for (int i = 0; i < kSteps; ++i) {
     const auto s = static_cast<std::size_t>(i);
-    chain(total, error_transition(mean, gyro[s], accel[s], dt, noise));
+    chain(filter_kernels(), total, error_transition(mean, gyro[s], accel[s], dt, noise));
     mean = integrate(mean, gyro[s], accel[s], dt);
   }
   constexpr int kRuns = 4000;

@@ -87,6 +87,8 @@ template <typename T>
 constexpr int kNotInFiles = 0;
 template <>
 constexpr int kNotInFiles<FrontendConfig> = 1;
+template <>
+constexpr int kNotInFiles<FilterConfig> = 1;
 
 // Checks that visit() knows every field, here and below.
 template <typename T>

@@ -12,7 +12,7 @@ STANDARD = ["freestanding", "hosted"]  # the C++ library; the filter has only th
 RECORDS = ["filter/ekf/records.h", "filter/ekf/displacement.h", "filter/ekf/gate.h", "filter/sources/cameras/frame_agreement.h"]
 SOURCES = ["filter/sources/", "filter/sources/cameras/", "filter/sources/cameras/frame_agreement.h", "filter/sources/wheels/",
            "filter/sources/ground/", "filter/sources/standstill/"]
-BELOW_SOURCES = ["filter/ekf/", *RECORDS[:3], "filter/ingest/", "include/ear/", "eigen", "freestanding"]
+BELOW_SOURCES = ["filter/ekf/", *RECORDS[:3], "filter/ingest/", "filter/kernels/", "include/ear/", "eigen", "freestanding"]
 FILTER = ["filter/", "filter/advice.h", "filter/ingest/", "filter/ekf/", *RECORDS, *SOURCES, "filter/start/", "filter/health/"]
 
 # What the files of a folder may include: layers and libraries. A file belongs to the longest folder that holds it.
@@ -22,7 +22,9 @@ LAYERS = {
     "filter/": [*FILTER, "include/ear/", "eigen", "freestanding"],
     "filter/advice.h": ["filter/ekf/displacement.h", "include/ear/", "freestanding"],
     "filter/ingest/": ["filter/ingest/", "include/ear/", "eigen", "freestanding"],
-    "filter/ekf/": ["filter/ekf/", *RECORDS[:3], "filter/ingest/", "include/ear/", "eigen", "freestanding"],
+    "filter/kernels/": ["filter/kernels/", "filter/kernels/four.h", "include/ear/", "freestanding"],
+    "filter/kernels/four.h": ["vector unit", "freestanding"],
+    "filter/ekf/": ["filter/ekf/", *RECORDS[:3], "filter/ingest/", "filter/kernels/", "include/ear/", "eigen", "freestanding"],
     "filter/ekf/displacement.h": ["include/ear/", "eigen", "freestanding"],
     "filter/ekf/gate.h": ["freestanding"],
     "filter/ekf/records.h": ["include/ear/", "eigen", "freestanding"],

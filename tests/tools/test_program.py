@@ -65,7 +65,8 @@ class CommandLine(unittest.TestCase):
         environment = {**os.environ, "EAR_KERNELS": first}
         self.assertIn(f"kernels: {first} (", ear("--version", environment=environment).stdout)
         environment["EAR_KERNELS"] = "mmx"
-        self.assert_refused(ear("bench", ".", environment=environment), 'EAR_KERNELS: no kernels are called "mmx"')
+        for command in (("bench", "."), ("live", "--sensors", ".")):
+            self.assert_refused(ear(*command, environment=environment), 'EAR_KERNELS: no kernels are called "mmx"')
 
     def test_no_arguments(self):
         self.assert_refused(ear(), "subcommand")
@@ -87,7 +88,13 @@ class CommandLine(unittest.TestCase):
             other = Path(folder) / "other.json"
             for text in ("{}", "not JSON"):
                 other.write_text(text, encoding="utf-8")
-                self.assert_refused(ear("bench", folder, "--compare", other), f"{other}: not the output of ear bench")
+                for what in (folder, "--suite"):
+                    self.assert_refused(ear("bench", what, "--compare", other), f"{other}: not the output of ear bench")
+
+    def test_bench_takes_a_recording_or_the_suite(self):
+        for arguments in ((), (".", "--suite")):
+            self.assert_refused(ear("bench", *arguments), "bench: give either RECORDING or --suite")
+        self.assert_refused(ear("bench", ".", "--repeat", "2"), "--suite")
 
     def test_check_reports_a_missing_recording(self):
         result = ear("check", "missing")  # its findings are its output, not an error of the program
@@ -163,6 +170,7 @@ class EndToEnd(unittest.TestCase):
         self.assertGreater(figures["peak_memory_mb"], 5.0)
         text = self.run_ear("bench", recording, "--compare", old)
         self.assertRegex(text, r"pipeline +\d+\.\d+ +\d+\.\d+ +[+-]\d+\.\d %")
+        self.assertRegex(text, r"\n\| [^|]+ \| \d+ \| \d+ \| \w+ \| \w+ \| recording \| 150 \|( \d+\.\d\d \|){3} \S+ \|\n\Z")
 
     def check_smoother(self, recording, output):
         if "{filter,smoother}" not in ear("run", "--help").stdout:

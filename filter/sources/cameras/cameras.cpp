@@ -53,7 +53,7 @@ Displacement Cameras::displacement(const FeatureFrame& frame, TimeNs t_ns, const
     StereoMotion start;
     start.R_B0B1 = motion.R_BiBj;
     start.p_B0B1 = motion.p_BiBj;
-    compared_.seen = stereo_motion(matches, ekf.state().camera, start, feature_sigma(), kComparedStep);
+    compared_.seen = stereo_motion(matches, ekf.state().camera, start, feature_sigma(), kComparedStep, config_.kernels);
     result.available = compared_.seen.has_value();
     result.contradictory = !compared_.seen && matches.size() >= kFewestMatches;
     if (compared_.seen) result.p_BiBj = compared_.seen->p_B0B1;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <limits>
 
 namespace ear {
 namespace {
@@ -13,42 +14,23 @@ constexpr int kCalibration = 12;  // columns of the cameras' poses; the time off
 /// First column of a clone, counted from err::camera.
 constexpr int clone_column(int clone) { return err::clone(clone) - err::camera; }
 
+ConstMatrix readable(const Eigen::MatrixXd& M) { return {M.data(), M.outerStride()}; }
+MutableMatrix writable(Eigen::MatrixXd& M) { return {M.data(), M.outerStride()}; }
+
 /// The rows of which A = H^T H and b = H^T r are the sums: Cholesky with diagonal pivoting, row by row. A, of which
 /// only the lower triangle is read, is singular (yaw and position are free, calibration is seen in part). The largest
 /// pivot against `scale` comes first, so that rounding does not grow; one lost in rounding adds nothing, and ends it.
 /// Without the pivoting rounding makes up rows, and once in some ten thousand frames one that moves the estimate by ten
-/// sigmas. b is overwritten; `pivots` is scratch.
-void rows_from_sums(const Eigen::Ref<const Eigen::MatrixXd>& A, Eigen::Ref<Eigen::VectorXd> b,
-                    Eigen::Ref<Eigen::VectorXd> pivots, const Eigen::VectorXd& scale, double negligible,
-                    WhitenedRows& rows) {
-  const int size = static_cast<int>(b.size());
-  auto& Ht = rows.H_transposed;
-  pivots = A.diagonal();
-  rows.count = 0;
-  while (rows.count < size) {
-    int j = 0;
-    double largest = 0.0;
-    for (int k = 0; k < size; ++k) {
-      if (pivots(k) <= largest * scale(k)) continue;
-      largest = pivots(k) / scale(k);
-      j = k;
-    }
-    if (largest <= negligible) break;
-    const double root = std::sqrt(pivots(j));
-    auto u = Ht.col(rows.count).head(size);
-    u.head(j) = A.row(j).head(j).transpose();
-    u.tail(size - j) = A.col(j).tail(size - j);
-    u.noalias() -= Ht.topLeftCorner(size, rows.count) * Ht.row(j).head(rows.count).transpose();
-    u /= root;
-    u = (pivots.array() > 0.0).select(u, 0.0);  // those that came before are done
-    u(j) = root;
-    rows.r(rows.count) = b(j) / root;
-    b -= rows.r(rows.count) * u;
-    pivots -= u.cwiseAbs2();
-    pivots(j) = 0.0;
-    ++rows.count;
-  }
-  rows.H.topLeftCorner(rows.count, size) = Ht.topLeftCorner(size, rows.count).transpose();
+/// sigmas. b is overwritten; `pivots` is scratch; all three vectors have room for whole groups of eight.
+void rows_from_sums(const FilterKernels& kernels, const Eigen::MatrixXd& A, int size, Eigen::VectorXd& b,
+                    Eigen::VectorXd& pivots, Eigen::VectorXd& scale, double negligible, WhitenedRows& rows) {
+  pivots.head(size) = A.diagonal().head(size);
+  const int beyond = rounded_up(size) - size;  // never the largest
+  pivots.segment(size, beyond).setZero();
+  scale.segment(size, beyond).setOnes();
+  rows.count = kernels.pivoted_rows(readable(A), size, b.data(), pivots.data(), scale.data(), negligible,
+                                    writable(rows.H_transposed), rows.r.data());
+  rows.H.topLeftCorner(rows.count, size) = rows.H_transposed.topLeftCorner(size, rows.count).transpose();
 }
 
 }  // namespace
@@ -111,25 +93,26 @@ LinearizedObservation linearize_observation(const Pose& T_WB, const CameraState&
   return z;
 }
 
-FeatureInformation::FeatureInformation(int max_clones, int max_features) {
+FeatureInformation::FeatureInformation(int max_clones, int max_features, Kernels kernels)
+    : kernels_(filter_kernels(kernels)) {
   const int size = err::clone(max_clones) - err::camera;
   for (Eigen::MatrixXd* const matrix :
        {&A_, &gate_A_, &gate_PHt_, &rows_.H, &rows_.H_transposed, &gate_rows_.H, &gate_rows_.H_transposed}) {
-    matrix->resize(size, size);
+    matrix->setZero(stride_for(size), rounded_up(size));
   }
   for (Eigen::VectorXd* const vector : {&b_, &gate_b_, &scale_, &pivots_, &rows_.r, &gate_rows_.r}) {
-    vector->resize(size);
+    vector->setZero(rounded_up(size));
   }
-  W_.resize(size, 3 * max_features);
+  W_.setZero(stride_for(size), 3 * max_features);
   weights_.reserve(2 * static_cast<std::size_t>(max_clones));
 }
 
 void FeatureInformation::start(int error_size) {
   size_ = error_size - err::camera;
-  assert(size_ <= A_.rows());
+  assert(size_ <= A_.cols());
   features_ = 0;
   rows_.count = 0;
-  A_.topLeftCorner(size_, size_).setZero();
+  A_.topLeftCorner(rounded_up(size_), rounded_up(size_)).setZero();
   b_.head(size_).setZero();
 }
 
@@ -165,7 +148,7 @@ bool FeatureInformation::add(const std::vector<LinearizedObservation>& observati
     W.topRows<kCalibration>().noalias() += z.H_calibration.transpose().lazyProduct(wH_f);
     W.middleRows<err::clone_size>(clone_column(z.clone)).noalias() += z.H_clone.transpose().lazyProduct(wH_f);
   }
-  V_llt.matrixU().solveInPlace<Eigen::OnTheRight>(W);
+  kernels_.solve({V_llt.matrixLLT().data(), 3}, size_, 3, {W.data(), W.outerStride()});
 
   // With P = 0 the statistic is largest: who passes then passes anyway, and the full test is not needed.
   const double residual_cost = cost - Lv.squaredNorm();
@@ -201,36 +184,31 @@ void FeatureInformation::sum_up(const std::vector<LinearizedObservation>& observ
 double FeatureInformation::chi_squared(const std::vector<LinearizedObservation>& observations,
                                        const Eigen::Vector3d& Lv, const Eigen::Ref<const Eigen::MatrixXd>& P,
                                        double residual_cost) {
-  auto A = gate_A_.topLeftCorner(size_, size_);
-  auto b = gate_b_.head(size_);
-  A.setZero();
-  b.setZero();
+  gate_A_.topLeftCorner(rounded_up(size_), rounded_up(size_)).setZero();
+  gate_b_.head(size_).setZero();
   sum_up(observations, Lv, gate_A_, gate_b_);
-  scale_.head(size_) = A.diagonal();
-  A.selfadjointView<Eigen::Lower>().rankUpdate(W_.block(0, 3 * features_, size_, 3), -1.0);
-  rows_from_sums(A, b, pivots_.head(size_), scale_, kRounding, gate_rows_);
+  scale_.head(size_) = gate_A_.diagonal().head(size_);
+  kernels_.subtract_square({W_.col(3 * features_).data(), W_.outerStride()}, 3, size_, writable(gate_A_));
+  rows_from_sums(kernels_, gate_A_, size_, gate_b_, pivots_, scale_, kRounding, gate_rows_);
 
   const int rows = gate_rows_.count;
-  const auto H = gate_rows_.H.topLeftCorner(rows, size_);
+  const auto& Ht = gate_rows_.H_transposed;
   auto r = gate_rows_.r.head(rows);
-  auto PHt = gate_PHt_.topLeftCorner(size_, rows);
-  PHt.noalias() = P.block(err::camera, err::camera, size_, size_) * H.transpose();
-  Eigen::Ref<Eigen::MatrixXd> S = gate_A_.topLeftCorner(rows, rows);  // the sum is read no more
-  S.noalias() = H * PHt;
-  S.diagonal().array() += 1.0;
-  const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> llt(S);  // in place
+  const auto P_camera = P.block(err::camera, err::camera, size_, size_);
+  for (int k = 0; k < rows; ++k) gate_PHt_.col(k).head(size_).noalias() = P_camera * Ht.col(k).head(size_);
+  kernels_.multiply_transposed(readable(Ht), readable(gate_PHt_), rounded_up(size_), rows, writable(gate_A_));
+  gate_A_.diagonal().head(rows).array() += 1.0;  // of H P H^T: the sum is read no more
   const double noise_cost = residual_cost - r.squaredNorm();
-  llt.matrixL().solveInPlace(r);
+  if (!kernels_.factorize(writable(gate_A_), rows, r.data())) return std::numeric_limits<double>::infinity();
   return noise_cost + r.squaredNorm();
 }
 
 void FeatureInformation::compress(double negligible) {
   rows_.count = 0;
   if (features_ == 0) return;
-  auto A = A_.topLeftCorner(size_, size_);
-  scale_.head(size_) = A.diagonal();
-  A.selfadjointView<Eigen::Lower>().rankUpdate(W_.topLeftCorner(size_, 3 * features_), -1.0);
-  rows_from_sums(A, b_.head(size_), pivots_.head(size_), scale_, negligible, rows_);
+  scale_.head(size_) = A_.diagonal().head(size_);
+  kernels_.subtract_square(readable(W_), 3 * features_, size_, writable(A_));
+  rows_from_sums(kernels_, A_, size_, b_, pivots_, scale_, negligible, rows_);
 }
 
 }  // namespace ear

@@ -7,6 +7,7 @@
 
 #include "filter/ekf/gate.h"
 #include "filter/ekf/state.h"
+#include "filter/kernels/filter_kernels.h"
 #include "filter/sources/cameras/tracks.h"
 #include "filter/sources/cameras/triangulation.h"
 
@@ -53,7 +54,7 @@ struct WhitenedRows {
 /// number of rows.
 class FeatureInformation {
  public:
-  FeatureInformation(int max_clones, int max_features);
+  FeatureInformation(int max_clones, int max_features, Kernels kernels = Kernels::best);
 
   /// Starts a frame. `error_size`: that of the state.
   void start(int error_size);
@@ -78,10 +79,11 @@ class FeatureInformation {
   void sum_up(const std::vector<LinearizedObservation>& observations, const Eigen::Vector3d& Lv, Eigen::MatrixXd& A,
               Eigen::VectorXd& b) const;
 
+  FilterKernels kernels_;
   int size_ = 0;      // columns: the camera's part of the error vector
   int features_ = 0;  // in W_
   WhitenedRows rows_;
-  Eigen::MatrixXd A_, W_;  // W_: H^T H_f V^-1/2 of each feature, 3 columns each
+  Eigen::MatrixXd A_, W_;  // with rows beyond for the kernels; W_: H^T H_f V^-1/2 of each feature, 3 columns each
   Eigen::VectorXd b_, scale_, pivots_;
   std::vector<double> weights_;  // of its observations: Huber's, over the variance
   WhitenedRows gate_rows_;

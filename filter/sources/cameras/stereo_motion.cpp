@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 
 #include "filter/ekf/so3.h"
 #include "filter/ingest/capacity.h"
+#include "filter/kernels/filter_kernels.h"
 
 namespace ear {
 namespace {
@@ -23,70 +25,79 @@ struct NormalEquations {
   Eigen::Matrix<double, 6, 1> b = Eigen::Matrix<double, 6, 1>::Zero();
 };
 
-/// A camera of frame 1. A point of frame 0 with the ray x and the inverse depth s, both in the left camera, is at
-/// h = R x + s p in it, times its inverse depth. The sums are over a turn and a shift of the points in this camera:
-/// dh = [h]x theta - s tau.
-struct View {
-  Eigen::Matrix3d R;
-  Eigen::Vector3d p;
-  NormalEquations sums;
-
-  /// One observation; whether it fits.
-  bool add(const Eigen::Vector2d& ray, double s, const Eigen::Vector2d& uv, double sigma) {
-    const Eigen::Vector3d h = R * ray.homogeneous() + s * p;
-    if (h.z() < kLeastDepth) return false;
-    const double u = h.x() / h.z();
-    const double v = h.y() / h.z();
-    const double q = s / h.z();
-    Eigen::Matrix<double, 2, 6> H;
-    H << u * v, -(1.0 + u * u), v, -q, 0.0, q * u,  //
-        1.0 + v * v, -u * v, -u, 0.0, -q, q * v;
-    const Eigen::Vector2d r = uv - Eigen::Vector2d(u, v);
-    const double distance = r.norm() / sigma;
-    const double weight = (distance > kHuber ? kHuber / distance : 1.0) / (sigma * sigma);
-    sums.A.noalias() += H.transpose() * (weight * H);
-    sums.b.noalias() += H.transpose() * (weight * r);
-    return distance < kFits;
+/// The sums of a camera's kernel, which are over a turn and a shift of the points in it: dh = [h]x theta - s tau.
+NormalEquations equations_of(const StereoSums& sums) {
+  NormalEquations equations;
+  const double* entry = sums.A;
+  for (Eigen::Index column = 0; column < 6; ++column) {
+    for (Eigen::Index row = column; row < 6; ++row, ++entry) {
+      equations.A(row, column) = equations.A(column, row) = *entry;
+    }
+    equations.b(column) = sums.b[column];
   }
-};
+  return equations;
+}
+
+PlainPose plain(const Eigen::Matrix3d& R, const Eigen::Vector3d& p) {
+  PlainPose pose;
+  Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(pose.R) = R;
+  Eigen::Map<Eigen::Vector3d>(pose.p) = p;
+  return pose;
+}
+
+/// The matches as the kernels read them.
+StereoTable table_of(const std::vector<StereoMatch>& matches) {
+  constexpr std::size_t kNumber = sizeof(double);
+  static_assert(offsetof(StereoMatch, left0) == 0 && offsetof(StereoMatch, right0) == 2 * kNumber &&
+                offsetof(StereoMatch, left1) == 4 * kNumber && offsetof(StereoMatch, right1) == 6 * kNumber &&
+                sizeof(StereoMatch) % kNumber == 0);
+  return {matches.front().left0.data(), sizeof(StereoMatch) / kNumber, &matches.front().has_right1,
+          static_cast<int>(matches.size())};
+}
 
 class Problem {
  public:
-  Problem(const std::vector<StereoMatch>& matches, const CameraState& cameras, double sigma)
-      : matches_(matches), state_(cameras), sigma_(sigma), baseline_(cameras.T_C0C1.p.norm()) {
+  Problem(const std::vector<StereoMatch>& matches, const CameraState& cameras, double sigma, Kernels kernels)
+      : kernels_(filter_kernels(kernels)),
+        table_(table_of(matches)),
+        sigma_(sigma),
+        baseline_(cameras.T_C0C1.p.norm()) {
     const Pose& T_BC0 = cameras.T_BC0;
     T_BC_[0] = T_BC0;
     T_BC_[1] = {T_BC0.R * cameras.T_C0C1.R, T_BC0.R * cameras.T_C0C1.p + T_BC0.p};
+    const Eigen::Matrix3d R_C1C0 = cameras.T_C0C1.R.transpose();
+    plain_.right0 = plain(R_C1C0, -(R_C1C0 * cameras.T_C0C1.p));
+    plain_.huber = kHuber;
+    plain_.fits = kFits;
+    plain_.least_depth = kLeastDepth;
   }
 
   /// One step from `x`. `fitting`: how many features fit.
-  NormalEquations step(const StereoMotion& x, int& fitting) const {
-    std::array<View, 2> views = {view_of(T_BC_[0], x), view_of(T_BC_[1], x)};
-    fitting = 0;
+  NormalEquations step(const StereoMotion& x, int& fitting) {
     // A depth's error moves the point in frame 1 by its parallax, which is in proportion to the motion.
     const double share = std::sqrt(2.0) * x.p_B0B1.norm() / baseline_;
-    const double sigma = sigma_ * std::sqrt(1.0 + share * share);
-    for (const StereoMatch& match : matches_) {
-      const double s = stereo_inverse_depth(state_, match.left0, match.right0);  // cheaper than memory for all of them
-      if (s < 0.0) continue;                                                     // behind the cameras
-      bool fits = views[0].add(match.left0, s, match.left1, sigma);
-      if (match.has_right1) fits = views[1].add(match.left0, s, match.right1, sigma) && fits;
-      fitting += fits ? 1 : 0;
-    }
+    plain_.sigma = sigma_ * std::sqrt(1.0 + share * share);
+    std::array<StereoSums, 2> camera_sums;
+    for (std::size_t k = 0; k < 2; ++k) plain_.frame1[k] = view_of(T_BC_[k], x);
+    fitting = kernels_.add_stereo(table_, plain_, camera_sums.data());
     NormalEquations sums;
-    for (std::size_t k = 0; k < views.size(); ++k) {
+    for (std::size_t k = 0; k < 2; ++k) {
       const Eigen::Matrix<double, 6, 6> J = camera_by_body(T_BC_[k], x);
-      sums.A += J.transpose() * views[k].sums.A * J;
-      sums.b += J.transpose() * views[k].sums.b;
+      const NormalEquations camera = equations_of(camera_sums[k]);
+      const Eigen::Matrix<double, 6, 6> AJ = camera.A.lazyProduct(J);
+      sums.A += J.transpose().lazyProduct(AJ);
+      sums.b += J.transpose().lazyProduct(camera.b);
     }
     return sums;
   }
 
  private:
-  [[nodiscard]] View view_of(const Pose& T_BC, const StereoMotion& x) const {
+  /// A point of frame 0 with the ray x and the inverse depth s, both in the left camera, is at h = R x + s p in a
+  /// camera of frame 1, times its inverse depth.
+  [[nodiscard]] PlainPose view_of(const Pose& T_BC, const StereoMotion& x) const {
     const Eigen::Matrix3d R_CB0 = T_BC.R.transpose() * x.R_B0B1.transpose();
     const Pose& T_BC0 = T_BC_[0];
-    return {R_CB0 * T_BC0.R, R_CB0 * (T_BC0.p - x.p_B0B1) - T_BC.R.transpose() * T_BC.p, {}};
+    return plain(R_CB0 * T_BC0.R, R_CB0 * (T_BC0.p - x.p_B0B1) - T_BC.R.transpose() * T_BC.p);
   }
 
   /// (theta, tau) in a camera by the turn of R_B0B1 and the shift of p_B0B1.
@@ -99,8 +110,9 @@ class Problem {
     return J;
   }
 
-  const std::vector<StereoMatch>& matches_;
-  const CameraState& state_;
+  FilterKernels kernels_;
+  StereoTable table_;
+  StereoProblem plain_{};
   double sigma_;
   double baseline_;
   std::array<Pose, 2> T_BC_;
@@ -144,11 +156,11 @@ double stereo_inverse_depth(const CameraState& cameras, const Eigen::Vector2d& l
 }
 
 std::optional<StereoMotion> stereo_motion(const std::vector<StereoMatch>& matches, const CameraState& cameras,
-                                          const StereoMotion& start, double sigma, double settled) {
+                                          const StereoMotion& start, double sigma, double settled, Kernels kernels) {
   StereoMotion motion = start;
   motion.matches = static_cast<int>(matches.size());
   if (motion.matches < static_cast<int>(kFewestMatches)) return std::nullopt;
-  const Problem problem(matches, cameras, sigma);
+  Problem problem(matches, cameras, sigma, kernels);
   for (int iteration = 0; iteration < kIterations; ++iteration) {
     const NormalEquations sums = problem.step(motion, motion.fitting);
     const Eigen::LDLT<Eigen::Matrix<double, 6, 6>> ldlt(sums.A);

@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "ear/kernels.h"
 #include "ear/types.h"
 #include "filter/ekf/state.h"
 
@@ -68,6 +69,7 @@ struct ExcessTurn {
 /// do not move as one body.
 [[nodiscard]] std::optional<StereoMotion> stereo_motion(const std::vector<StereoMatch>& matches,
                                                         const CameraState& cameras, const StereoMotion& start,
-                                                        double sigma, double settled = 1e-8);
+                                                        double sigma, double settled = 1e-8,
+                                                        Kernels kernels = Kernels::best);
 
 }  // namespace ear

@@ -22,7 +22,7 @@ TrackUpdate::TrackUpdate(const FilterConfig& config, double focal_px, std::size_
     : config_(config),
       focal_px_(focal_px),
       camera_count_(cameras),
-      information_(config.window + 1, config.max_track_updates) {
+      information_(config.window + 1, config.max_track_updates, config.kernels) {
   const auto clones = static_cast<std::size_t>(config.window) + 1;
   cameras_.reserve(2 * clones);
   sightings_.reserve(2 * clones);
