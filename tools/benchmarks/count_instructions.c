@@ -3,8 +3,9 @@
 //
 //   qemu-aarch64 -plugin libcount.so,code=HEX,function=HEX,function=HEX... -d plugin PROGRAM
 //
-// Addresses are those of the program's file; `code`: of its first segment that is executed. Prints a line for each function: its number, calls, instructions; then
-// "all" and those of the whole program. A function that another one jumps to, rather than calls, cannot be followed.
+// Addresses are those of the program's file; `code`: of its first segment that is executed. Prints a line for each
+// function: its number, calls, instructions; then "all" and those of the whole program. A function that another one
+// jumps to, rather than calls, cannot be followed.
 //
 // The interface is that of qemu-plugin.h, version 1, which Debian does not package.
 #include <inttypes.h>
