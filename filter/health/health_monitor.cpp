@@ -6,7 +6,6 @@ namespace ear {
 namespace {
 
 constexpr double kMajority = 0.5;        // of the measurements of a wheel or beam
-constexpr double kMostOff = 0.5;         // of the features off their place: the images contradict the state
 constexpr int kFewTracks = 10;           // chosen
 constexpr double kStale = 0.5;           // [s] chosen: after which what the last frame showed holds no more
 constexpr double kTick = 0.03;           // [s] chosen: between two looks at silent sensors
@@ -198,7 +197,7 @@ void HealthMonitor::decide(TimeNs t_ns) {
   if (health_.aiding != Aiding::none) life_.aided_ns = t_ns;
   const bool fresh = seconds_between(last_.t_ns, t_ns) < kStale;
   const bool off = fresh && images_.come(t_ns) &&
-                   ((last_.statistics.tracks >= kFewTracks && last_.agreement.left > kMostOff) || images_.misfit());
+                   ((last_.statistics.tracks >= kFewTracks && last_.agreement.contradicts()) || images_.misfit());
   if (!off || (fresh && wheels_carry(last_.statistics))) life_.fitting_ns = t_ns;
   if (off || health_.aiding == Aiding::none || !last_.running) life_.doubtful_ns = t_ns;
   life_.contradicted = last_.running && seconds_between(life_.fitting_ns, t_ns) > kContradicted;

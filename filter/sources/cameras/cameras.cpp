@@ -126,6 +126,7 @@ double Cameras::apparent_rate(double dt, const Ekf& ekf) const {
 
 FrameAgreement Cameras::compare(const FeatureFrame& frame, const Ekf& ekf) {
   FrameAgreement agreement;
+  compared_.agrees = true;
   if (count_ < 2) return agreement;
   const State& x = ekf.state();
   const double dt = last_ ? seconds_between(last_->t_ns, frame.t_ns) : 0.0;
@@ -134,6 +135,7 @@ FrameAgreement Cameras::compare(const FeatureFrame& frame, const Ekf& ekf) {
     const double sigma_v = std::sqrt(ekf.covariance().matrix().diagonal().segment<3>(err::nu).maxCoeff());
     const double sigma_p = dt * sigma_v;
     agreement = frame_check_.compare(matches_with(frame), {moved.R, moved.p, sigma_p}, x.camera, noise_);
+    compared_.agrees = !agreement.contradicts();
     if (compared_.seen) {
       const Eigen::Matrix3d loose = Eigen::Matrix3d::Identity() * std::pow(kLooser * sigma_p, 2);
       const ExcessTurn turn = turn_beyond(*compared_.seen, moved.R, moved.p, loose);
@@ -181,7 +183,7 @@ void Cameras::remember(const FeatureFrame& frame, const Ekf& ekf) {
 }
 
 bool Cameras::show_motion(const State& x) const {
-  return last_ && last_features_.features.size() >= kFewFeatures &&
+  return last_ && compared_.agrees && last_features_.features.size() >= kFewFeatures &&
          seconds_between(imu_time(last_->t_ns, x.camera), x.imu.t_ns) < kRecent;
 }
 

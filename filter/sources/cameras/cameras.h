@@ -56,7 +56,7 @@ class Cameras {
   void update(const FeatureFrame& frame, double weight, CameraUpdate calibration, Ekf& ekf, Records& records);
   /// The body's pose joins the window, without an image.
   void clone_without_image(double weight, Ekf& ekf);
-  /// Did an image with features enough come not long ago?
+  /// Did an image with features enough come not long ago, and agree with the state?
   [[nodiscard]] bool show_motion(const State& x) const;
   /// The state is as well known as if features had updated it.
   void set_updated(TimeNs t_ns) { window_.set_updated(t_ns); }
@@ -78,6 +78,7 @@ class Cameras {
     TimeNs t_ns = 0;                   ///< at this IMU time
     std::optional<TimeNs> matched_ns;  ///< stamp of the frame that matches_ holds the features of, and of this one
     std::optional<StereoMotion> seen;  ///< between these two
+    bool agrees = true;                ///< most features were where the state expected them
   };
 
   /// Of one observation in the newest frame, normalized.

@@ -17,6 +17,9 @@ struct FrameAgreement {
   bool frozen = false;         ///< the image is exactly the one before
   Eigen::Vector3d turn = Eigen::Vector3d::Zero();  ///< by which the vehicle turned more than predicted [rad], in B
   bool turn_known = false;
+
+  /// Do the images contradict the state? Most features are off their place then.
+  [[nodiscard]] bool contradicts() const { return left > 0.5; }
 };
 
 }  // namespace ear
