@@ -71,7 +71,7 @@ ImuFault Ingest::store(const ImuSample& sample) {
 }
 
 Ingest::Encoders Ingest::take(EncoderSample sample, std::optional<TimeNs> state_ns) {
-  const std::optional<TimeNs> stamp = encoder_clock_.correct(sample.t_ns, now());
+  const std::optional<TimeNs> stamp = encoder_clock_.correct(sample.t_ns, now(), imu_interval());
   if (!stamp) return {guard_.refuse_encoder(), std::nullopt};
   sample.t_ns = *stamp;
   const Verdict verdict = guard_.judge(sample, state_ns, *encoder_);
@@ -122,6 +122,10 @@ void Ingest::drop_readings() {
 std::optional<TimeNs> Ingest::now() const {
   if (imu_.empty() || imu_clock_.waiting() || guard_.refuses_imu()) return std::nullopt;
   return imu_.newest().t_ns;
+}
+
+double Ingest::imu_interval() const {
+  return imu_.size() < 2 ? 0.0 : seconds_between(imu_[imu_.size() - 2].t_ns, imu_.newest().t_ns);
 }
 
 bool Ingest::covers(TimeNs imu_time_ns) const {

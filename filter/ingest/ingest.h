@@ -50,7 +50,9 @@ class Ingest {
     return guard_.judge(sample, state_ns);
   }
   /// A camera's stamp by the common clock; nothing while that is not known.
-  [[nodiscard]] std::optional<TimeNs> camera_stamp(TimeNs stamp_ns) { return camera_clock_.correct(stamp_ns, now()); }
+  [[nodiscard]] std::optional<TimeNs> camera_stamp(TimeNs stamp_ns) {
+    return camera_clock_.correct(stamp_ns, now(), imu_interval());
+  }
   [[nodiscard]] const FeatureFrame& plausible(const FeatureFrame& frame) { return guard_.plausible(frame); }
 
   /// If the buffer of inertial samples is full: the time up to which the state has to go before the next one.
@@ -80,6 +82,8 @@ class Ingest {
 
  private:
   [[nodiscard]] std::optional<TimeNs> now() const;
+  /// Between the last two inertial samples [s].
+  [[nodiscard]] double imu_interval() const;
 
   FilterConfig config_;
   Calibration calibration_;

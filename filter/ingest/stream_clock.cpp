@@ -16,13 +16,13 @@ constexpr double kPause = 5.0;     // intervals; after longer ones steps show no
 }  // namespace
 
 /// By how much a stamp is ahead of where readings that come at that time should be; 0 if that is no jump [s].
-double StreamClock::jump_at(TimeNs t_ns, TimeNs now_ns) const {
+double StreamClock::jump_at(TimeNs t_ns, TimeNs now_ns, double tick) const {
   const double passed = seconds_between(*last_now_ns_, now_ns);
   if (passed > kPause * interval_) return 0.0;
   const double intervals = std::max(1.0, std::round(passed / interval_));
   const double jump = seconds_between(*last_ns_, t_ns) - intervals * interval_;
   const double ahead = seconds_between(now_ns, t_ns) - ahead_;
-  return is_clock_jump(jump) && std::abs(ahead - jump) < kShare * std::abs(jump) ? jump : 0.0;
+  return is_clock_jump(jump) && std::abs(jump) > tick && std::abs(ahead - jump) < kShare * std::abs(jump) ? jump : 0.0;
 }
 
 void StreamClock::follow(TimeNs t_ns, std::optional<TimeNs> now_ns) {
@@ -49,7 +49,7 @@ bool StreamClock::shift_was_wrong(TimeNs stamp_ns, TimeNs now_ns) {
   return contradictions_ >= kContradictions;
 }
 
-std::optional<TimeNs> StreamClock::correct(TimeNs stamp_ns, std::optional<TimeNs> now_ns) {
+std::optional<TimeNs> StreamClock::correct(TimeNs stamp_ns, std::optional<TimeNs> now_ns, double tick) {
   if (!is_time(stamp_ns)) return stamp_ns;  // for the input guard to refuse
   if (now_ns && shift_was_wrong(stamp_ns, *now_ns)) {
     shift_ns_ = 0;
@@ -58,7 +58,7 @@ std::optional<TimeNs> StreamClock::correct(TimeNs stamp_ns, std::optional<TimeNs
   }
   TimeNs t_ns = stamp_ns - shift_ns_;
   if (count_ >= kToKnow && now_ns && last_ns_ && last_now_ns_) {
-    const double jump = jump_at(t_ns, *now_ns);
+    const double jump = jump_at(t_ns, *now_ns, tick);
     if (jump != 0.0) {
       const bool follows = suspect_ns_ && std::abs(seconds_between(*suspect_ns_, t_ns) - interval_) < kClockJump;
       suspect_ns_ = t_ns;

@@ -22,14 +22,15 @@ inline constexpr int kContradictions = 8;         ///< readings in a row, to put
 
 class StreamClock {
  public:
-  /// The stamp of a reading by the common clock, `now_ns` being the newest inertial sample, if that gives the time.
-  /// Nothing for the first one after a jump, which may have a false stamp of its own.
-  [[nodiscard]] std::optional<TimeNs> correct(TimeNs stamp_ns, std::optional<TimeNs> now_ns);
+  /// The stamp of a reading by the common clock, `now_ns` being the newest inertial sample, if that gives the time:
+  /// to within `tick`, the interval of these [s]. Nothing for the first one after a jump, which may have a false stamp
+  /// of its own.
+  [[nodiscard]] std::optional<TimeNs> correct(TimeNs stamp_ns, std::optional<TimeNs> now_ns, double tick = 0.0);
 
   [[nodiscard]] int jumps() const { return jumps_; }
 
  private:
-  [[nodiscard]] double jump_at(TimeNs t_ns, TimeNs now_ns) const;
+  [[nodiscard]] double jump_at(TimeNs t_ns, TimeNs now_ns, double tick) const;
   void follow(TimeNs t_ns, std::optional<TimeNs> now_ns);
   [[nodiscard]] bool shift_was_wrong(TimeNs stamp_ns, TimeNs now_ns);
 

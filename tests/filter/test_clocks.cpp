@@ -222,6 +222,18 @@ TEST_CASE("stream clock: late, missing and repeated readings are left alone") {
   CHECK(largest_error(run_stream(every_other, late)) == 0.0);
 }
 
+TEST_CASE("stream clock: inertial samples that are slower than the readings give the time in steps, and no jump") {
+  for (const TimeNs interval : {20 * kMs, 64 * kMs, 100 * kMs}) {
+    CAPTURE(interval);
+    StreamClock clock;
+    for (TimeNs t = 0; t < kEnd; t += 16 * kMs) {
+      const TimeNs now = t / interval * interval;
+      CHECK(clock.correct(t, now, 1e-9 * static_cast<double>(interval)) == t);
+    }
+    CHECK(clock.jumps() == 0);
+  }
+}
+
 TEST_CASE("stream clock: what looked like a jump while the process stood still is put back") {
   const TimeNs resumed = kJumpAt + 600 * kMs;
   const Driver stalled = [resumed](TimeNs t) { return t >= kJumpAt && t < resumed ? TimeNs{-1} : t; };
