@@ -64,6 +64,7 @@ ImuStatistics ImuBuffer::statistics(TimeNs from_ns, TimeNs to_ns) const {
   if (begin >= end) return s;
   Eigen::Vector3d gyro_squares = Eigen::Vector3d::Zero();
   Eigen::Vector3d accel_squares = Eigen::Vector3d::Zero();
+  double gyro_steps = 0.0, accel_steps = 0.0;
   const ImuSample& reference = (*this)[begin];  // differences to it keep the sum of squares exact
   for (std::size_t i = begin; i < end; ++i) {
     const Eigen::Vector3d gyro = (*this)[i].gyro_B - reference.gyro_B;
@@ -72,6 +73,9 @@ ImuStatistics ImuBuffer::statistics(TimeNs from_ns, TimeNs to_ns) const {
     s.accel_mean += accel;
     gyro_squares += gyro.cwiseAbs2();
     accel_squares += accel.cwiseAbs2();
+    if (i == begin) continue;
+    gyro_steps += ((*this)[i].gyro_B - (*this)[i - 1].gyro_B).squaredNorm();
+    accel_steps += ((*this)[i].accel_B - (*this)[i - 1].accel_B).squaredNorm();
   }
   const auto n = static_cast<double>(end - begin);
   s.count = static_cast<int>(end - begin);
@@ -82,6 +86,11 @@ ImuStatistics ImuBuffer::statistics(TimeNs from_ns, TimeNs to_ns) const {
   s.accel_spread = std::sqrt(std::max(0.0, (accel_squares / n - s.accel_mean.cwiseAbs2()).maxCoeff()));
   s.gyro_mean += reference.gyro_B;
   s.accel_mean += reference.accel_B;
+  if (s.count < 2) return s;
+  // The variance of a step is twice that of a sample, which is the density squared over the interval.
+  const double scale = s.duration / (6.0 * (n - 1.0) * (n - 1.0));
+  s.gyro_density = std::sqrt(scale * gyro_steps);
+  s.accel_density = std::sqrt(scale * accel_steps);
   return s;
 }
 

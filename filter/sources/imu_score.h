@@ -1,11 +1,12 @@
-// How noisy the inertial sensors are: what they measure between two images, against what the images show. Vibration,
-// samples that are missing and stamps that are wrong make them noisier than their data sheet. docs/filter.md,
-// "Propagation".
+// How noisy the inertial sensors are: at rest by their samples alone, in motion by what they measure between two images
+// against what the images show. Vibration, missing samples and wrong stamps make them noisier than their data sheet.
+// docs/filter.md, "Propagation".
 #pragma once
 
 #include "filter/ekf/covariance.h"
 #include "filter/ekf/imu_displacement.h"
 #include "filter/ekf/noise_score.h"
+#include "filter/ingest/imu_buffer.h"
 #include "filter/sources/cameras/stereo_motion.h"
 
 namespace ear {
@@ -15,6 +16,8 @@ class ImuScore {
   /// `adapts`: false for the noise that the calibration states.
   explicit ImuScore(bool adapts) : adapts_(adapts) {}
 
+  /// Samples of a vehicle that stands, which show the white noise; `stated`: what the calibration says of it.
+  void add_rest(const ImuStatistics& rest, const ImuCalibration& stated);
   /// The motion from the state to a frame at `t_ns` by the inertial samples, and as the images show it. `P`: of the
   /// state's error.
   void add(const ImuMotion& motion, const StereoMotion& images, const Covariance& P, TimeNs t_ns);
@@ -27,6 +30,7 @@ class ImuScore {
   static constexpr double kFarthest = 100.0;  // chosen: counting as ten times the usual noise at most
 
   bool adapts_;
+  ImuNoiseFactors at_rest_;  ///< on the stated noise, when it last stood
   NoiseScore gyro_{kMemory, kFarthest}, accel_{kMemory, kFarthest};
 };
 

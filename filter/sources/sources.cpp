@@ -43,6 +43,7 @@ void Sources::look_at(const FeatureFrame& frame, TimeNs t_ns, const Ingest& inge
   const bool repeated = frame.repeated && ekf.running();  // a frozen image shows no standing
   standstill_.update({repeated ? nothing : frame, t_ns, ingest.imu(),
                       ekf.running() ? std::optional(ekf.state().imu.b_g) : std::nullopt, on_ground()});
+  if (standstill_.stands()) imu_score_.add_rest(standstill_.recent(ingest.imu(), t_ns), imu_);
   ground_.set_gyro_bias(ekf.state().imu.b_g);
   if (stood && !standstill_.stands() && ekf.running()) ekf.inflate_biases(kShakenGyro, kShakenAccel);
 }
@@ -77,7 +78,8 @@ void Sources::advance(TimeNs t_ns, const Advice& advice, Ingest& ingest, Ekf& ek
     } else if (on_ground() && ground_.rolls_at(z->increment->from_ns)) {
       const bool supported = cameras_.show_motion(ekf.state());
       wheels_->update(*z->increment,
-                      {ingest.imu(), ground_.known(), advice.of(MotionSensor::odometer), supported, camera_update_},
+                      {ingest.imu(), ground_.known(), advice.of(MotionSensor::odometer), supported, camera_update_,
+                       imu_score_.noise().gyro},
                       ekf, records);
     }
   }

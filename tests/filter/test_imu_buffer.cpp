@@ -1,6 +1,8 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <random>
 
 #include "filter/ingest/imu_buffer.h"
 
@@ -62,6 +64,30 @@ TEST_CASE("imu buffer: statistics of an interval") {
   CHECK(s.gyro_mean.x() == doctest::Approx(1.0));
   CHECK(s.gyro_spread == doctest::Approx(0.02));
   CHECK(s.accel_spread == doctest::Approx(0.5));
+  // Steps of 0.04 in one of three axes, 5 ms apart: half of their mean square, times 5 ms.
+  CHECK(s.gyro_density == doctest::Approx(0.04 * std::sqrt(0.005 / 6.0)));
+  CHECK(s.accel_density == doctest::Approx(1.0 * std::sqrt(0.005 / 6.0)));
+}
+
+TEST_CASE("imu buffer: the density of white noise, whatever the rate and the drift") {
+  std::mt19937_64 rng{17};
+  std::normal_distribution<double> normal;
+  for (const double rate : {100.0, 400.0}) {
+    ImuBuffer buffer(1000);
+    const auto noise = [&](double density) {
+      const double sigma = density * std::sqrt(rate);
+      const double x = normal(rng), y = normal(rng), z = normal(rng);
+      return Eigen::Vector3d(sigma * x, sigma * y, sigma * z);
+    };
+    for (int i = 0; i < 1000; ++i) {
+      const double t = i / rate;
+      const Eigen::Vector3d drift(0.1 * t, -0.05 * t, 1.0);
+      buffer.push({static_cast<TimeNs>(1e9 * t), drift + noise(2e-3), drift + noise(3e-2)});
+    }
+    const ImuStatistics s = buffer.statistics(0, 20'000'000'000);
+    CHECK(s.gyro_density == doctest::Approx(2e-3).epsilon(0.06));
+    CHECK(s.accel_density == doctest::Approx(3e-2).epsilon(0.06));
+  }
 }
 
 TEST_CASE("imu buffer: a piece has the larger noise of the samples at its ends; the mean rate has the largest") {

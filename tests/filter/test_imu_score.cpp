@@ -107,6 +107,22 @@ TEST_CASE("imu score: one image that is wrong changes little, and those in which
   CHECK(gyro_score(score) > 0.5);
 }
 
+TEST_CASE("imu score: what the samples show at rest is the noise that innovations are compared with") {
+  ImuCalibration stated;
+  ImuStatistics rest;
+  rest.count = 100;
+  rest.gyro_density = 4.0 * stated.gyro_noise;
+  rest.accel_density = 0.5 * stated.accel_noise;
+  ImuScore score(true);
+  score.add_rest(rest, stated);
+  CHECK(score.noise().gyro == doctest::Approx(4.0));
+  CHECK(score.noise().accel == 1.0);  // never less than stated
+  rest.count = 5;
+  rest.gyro_density = 100.0 * stated.gyro_noise;
+  score.add_rest(rest, stated);
+  CHECK(score.noise().gyro == doctest::Approx(4.0));
+}
+
 TEST_CASE("imu score: switched off, the noise is the stated one") {
   ImuScore score(false);
   CHECK(score.noise().gyro == 1.0);

@@ -19,7 +19,8 @@ Wheels::Wheels(const OdometerConfig& config, const Calibration& calibration, boo
 void Wheels::update(const WheelIncrement& increment, const Context& context, Ekf& ekf, Records& records) {
   const State& x = ekf.state();
   const BodyMotion motion = motion_at(middle_of(increment), x.imu, context.imu);
-  const MeanRate rate = context.imu.mean_rate(increment.from_ns, increment.to_ns);
+  MeanRate rate = context.imu.mean_rate(increment.from_ns, increment.to_ns);
+  rate.noise_factor *= context.gyro_noise;
   WheelRows rows = linearize_wheels(x, motion.R_WB, motion.v_W, increment, rate.gyro_B, config_.model, sees_ground_);
   Sigmas sigma = noise_of(rows, increment, rate, x);
   score_wheels(rows, sigma, increment.to_ns, context, ekf, records);

@@ -28,6 +28,7 @@ class Wheels {
     double weight = 1.0;        ///< (15)
     bool supported = false;     ///< images show how the vehicle moves too
     CameraUpdate calibration = CameraUpdate::considered;
+    double gyro_noise = 1.0;  ///< times the stated one
   };
   /// The filter's state is near the middle of the increment.
   void update(const WheelIncrement& increment, const Context& context, Ekf& ekf, Records& records);
