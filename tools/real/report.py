@@ -1,6 +1,7 @@
 """The page docs/real-data.md from the results of `tools/real_data run`."""
 
 from real.catalogue import DATA_SETS, HELD
+from real.altered import table as altered_table
 from real.judge import table
 
 HEAD = """# Real recordings
@@ -11,6 +12,7 @@ This page is written by `tools/real_data report`; do not edit it.
     tools/real_data list                       # which there are, with licence and source
     tools/real_data convert euroc MH_01_easy   # a local copy of the original to our layout
     tools/real_data run                        # all in ../shared/data, or those named, by name or folder
+    tools/real_data alter                      # the same with something wrong in them (last section)
     tools/real_data report
 
 The figures are defined in [evaluation.md](evaluation.md), *far off* and *false tracking* in [its section](evaluation.md#false-tracking); positions are
@@ -60,9 +62,17 @@ def data_sets():
     return "\n".join(lines)
 
 
-def page(results):
+ALTERED = """## Altered
+
+The same recordings with something wrong in them: `tools/real_data alter`. ATE [m], and in bold for how much of the time the health says `tracking` while
+the position is far off. "none": no estimate, with a reason in words; empty: the recording lacks the sensor; "-": nothing to compare with.
+"""
+
+
+def page(results, altered=None):
     judged = [(r["name"], r["figures"] and {**r["figures"], "alarms_per_hour": r["alarms_per_hour"]}) for r in results]
-    return "\n".join([HEAD, table(judged), "", *notes(results), "", "## Data sets", "", data_sets(), "",
+    return "\n".join([HEAD, table(judged), "", *notes(results), "",
+                      *([ALTERED, altered_table(altered["results"], altered["names"]), ""] if altered else []), "## Data sets", "", data_sets(), "",
                       *lines_of("The converters read every row and name file, line and field of what is wrong; images are linked, not "
                                 "copied. That of comma2k19 makes, of the example segment in its repository, the recording above: the same "
                                 "samples and truth, and counts that are at most one off. That of kitti_raw has calibrations as above, but "

@@ -1,0 +1,227 @@
+"""Recordings with something wrong in them: wrong rates, times, noise, units and wiring, sensors that end.
+
+Nobody tuned to these. An estimate may be poor then, and may be refused; its health must not say "tracking" where it is far off.
+"""
+
+import random
+import re
+import shutil
+from dataclasses import dataclass
+from typing import Callable
+
+GYRO, ACCEL = (1, 2, 3), (4, 5, 6)  # columns of imu0
+CAMERAS = ("cam0", "cam1")
+WHEELS = "encoder0"
+BEAMS = "laser0"
+NO_SENSOR = ("state_groundtruth", "uwb", "ins_speed", "wheel_speed", "imu0_")  # truths, and originals that were made into others
+
+
+class Copy:
+    """A recording of our layout, copied into `folder`; images are links."""
+
+    def __init__(self, recording, folder):
+        self.mav0 = folder / "mav0"
+        for source in sorted((recording / "mav0").iterdir()):
+            target = self.mav0 / source.name
+            if source.is_file():
+                target.parent.mkdir(parents=True, exist_ok=True)
+                shutil.copyfile(source, target)
+                continue
+            target.mkdir(parents=True)
+            for entry in source.iterdir():
+                if entry.is_dir():
+                    (target / entry.name).symlink_to(entry.resolve())
+                else:
+                    shutil.copyfile(entry, target / entry.name)
+
+    def sensors(self):
+        return sorted(p.parent.name for p in self.mav0.glob("*/data.csv") if not p.parent.name.startswith(NO_SENSOR))
+
+    def rows(self, sensor):
+        lines = (self.mav0 / sensor / "data.csv").read_text(encoding="utf-8").splitlines()
+        return [line.split(",") for line in lines if line.strip() and not line.startswith("#")]
+
+    def write(self, sensor, rows):
+        text = "# altered\n" + "".join(",".join(row) + "\n" for row in rows)
+        (self.mav0 / sensor / "data.csv").write_text(text, encoding="utf-8")
+
+    def change(self, sensors, function):
+        """`function`: rows to rows, for each of the sensors that there are."""
+        for sensor in sensors:
+            if (self.mav0 / sensor / "data.csv").exists():
+                self.write(sensor, function(self.rows(sensor)))
+
+    def set_rate(self, sensor, divided_by):
+        path = self.mav0 / sensor / "sensor.yaml"
+        text = path.read_text(encoding="utf-8")
+        path.write_text(re.sub(r"rate_hz: *([0-9.]+)", lambda m: f"rate_hz: {float(m[1]) / divided_by:g}", text), encoding="utf-8")
+
+
+def each_value(columns, function):
+    def change(rows):
+        for row in rows:
+            for column in columns:
+                row[column] = repr(function(float(row[column]), column))
+        return rows
+
+    return change
+
+
+def later(seconds):
+    def change(rows):
+        return [[str(int(row[0]) + round(1e9 * seconds)), *row[1:]] for row in rows]
+
+    return change
+
+
+def every(count):
+    return lambda rows: rows[::count]
+
+
+def means_of(count):
+    def change(rows):
+        groups = [rows[i : i + count] for i in range(0, len(rows) - count + 1, count)]
+        mean = lambda group, column: repr(sum(float(row[column]) for row in group) / count)  # noqa: E731
+        return [[str(sum(int(row[0]) for row in group) // count), *(mean(group, c) for c in GYRO + ACCEL)] for group in groups]
+
+    return change
+
+
+def without_part(begin, end):
+    """Without the rows from one share of them to another."""
+    return lambda rows: rows[: int(begin * len(rows))] + rows[int(end * len(rows)) :]
+
+
+def slower_imu(count, change):
+    def alter(copy):
+        copy.change(["imu0"], change(count))
+        copy.set_rate("imu0", count)
+
+    return alter
+
+
+def on(sensors, change):
+    return lambda copy: copy.change(sensors, change)
+
+
+def scattered_stamps(copy):
+    draws, offsets = random.Random(1), {}
+    milliseconds = lambda row: int(row[0]) // 10**6  # noqa: E731  both cameras alike
+    for camera in CAMERAS:
+        copy.change([camera], lambda rows: [
+            [str(int(row[0]) + offsets.setdefault(milliseconds(row), round(draws.gauss(0.0, 3e6)))), *row[1:]] for row in rows])
+
+
+def noisy_imu(copy):
+    draws = random.Random(3)
+    copy.change(["imu0"], each_value(GYRO, lambda x, _: x + draws.gauss(0.0, 0.05)))
+    copy.change(["imu0"], each_value(ACCEL, lambda x, _: x + draws.gauss(0.0, 0.5)))
+
+
+def lost_samples(copy):
+    draws = random.Random(2)
+    copy.change(["imu0"], lambda rows: [row for row in rows if draws.random() > 0.1])
+
+
+def exchanged(a, b):
+    def change(rows):
+        for row in rows:
+            row[a], row[b] = row[b], row[a]
+        return rows
+
+    return change
+
+
+def stuck_left_wheel(rows):
+    half = len(rows) // 2
+    return rows[:half] + [[row[0], rows[half][1], row[2]] for row in rows[half:]]
+
+
+def exchanged_images(copy):
+    rows = {camera: copy.rows(camera) for camera in CAMERAS}
+    folders = {camera: (copy.mav0 / camera / "data").resolve() for camera in CAMERAS}
+    for camera, other in (CAMERAS, CAMERAS[::-1]):
+        copy.write(camera, rows[other])
+        (copy.mav0 / camera / "data").unlink()
+        (copy.mav0 / camera / "data").symlink_to(folders[other])
+
+
+def begin_late(copy):
+    times = [int(row[0]) for row in copy.rows("imu0")]
+    begin = times[0] + (times[-1] - times[0]) // 3
+    copy.change(copy.sensors(), lambda rows: [row for row in rows if int(row[0]) >= begin])
+
+
+@dataclass(frozen=True)
+class Alteration:
+    name: str
+    what: str
+    alter: Callable[[Copy], None]
+    needs: tuple[str, ...] = ("imu0",)  # sensors without which it changes nothing
+
+
+ALTERATIONS = [
+    Alteration("nothing", "as it is", lambda copy: None),
+    Alteration("camera_half", "every other image", on(CAMERAS, every(2)), ("cam0",)),
+    Alteration("camera_third", "every third image", on(CAMERAS, every(3)), ("cam0",)),
+    Alteration("camera_stamps", "stamps of the images scatter by 3 ms", scattered_stamps, ("cam0",)),
+    Alteration("camera_ends", "no image in the second half", on(CAMERAS, without_part(0.5, 1.0)), ("cam0",)),
+    Alteration("camera_gap", "no image in the third of five parts", on(CAMERAS, without_part(0.4, 0.6)), ("cam0",)),
+    Alteration("right_ends", "no right image in the second half", on(["cam1"], without_part(0.5, 1.0)), ("cam1",)),
+    Alteration("cameras_exchanged", "left and right images exchanged", exchanged_images, CAMERAS),
+    Alteration("imu_means", "means of four inertial samples", slower_imu(4, means_of)),
+    Alteration("imu_half", "every other inertial sample", slower_imu(2, every)),
+    Alteration("imu_quarter", "every fourth inertial sample", slower_imu(4, every)),
+    Alteration("imu_rate", "the same, and sensor.yaml states the rate of all", on(["imu0"], every(4))),
+    Alteration("imu_lost", "a tenth of the inertial samples lost, at random", lost_samples),
+    Alteration("imu_late", "stamps of the inertial samples 20 ms late", on(["imu0"], later(0.02))),
+    Alteration("imu_very_late", "the same by 100 ms", on(["imu0"], later(0.1))),
+    Alteration("imu_noise", "white noise of 0.05 rad/s and 0.5 m/s^2 on each sample", noisy_imu),
+    Alteration("gyro_bias", "gyroscope's bias of 0.05 rad/s in roll and yaw",
+               on(["imu0"], each_value((1, 3), lambda x, column: x + (0.05 if column == 3 else -0.05)))),
+    Alteration("accel_bias", "accelerometer's bias of 0.7 m/s^2 in x and y, fourteen times what the prior allows",
+               on(["imu0"], each_value((4, 5), lambda x, column: x + (0.7 if column == 4 else -0.7)))),
+    Alteration("gyro_degrees", "gyroscope in degrees per second", on(["imu0"], each_value(GYRO, lambda x, _: 57.29578 * x))),
+    Alteration("accel_g", "accelerometer in g", on(["imu0"], each_value(ACCEL, lambda x, _: x / 9.80665))),
+    Alteration("gyro_sign", "the yaw rate has the wrong sign", on(["imu0"], each_value((3,), lambda x, _: -x))),
+    Alteration("wheels_exchanged", "left and right wheel exchanged", on([WHEELS], exchanged(1, 2)), (WHEELS,)),
+    Alteration("wheels_sign", "wheels that count backwards",
+               on([WHEELS], lambda rows: [[t, str(-int(left)), str(-int(right))] for t, left, right in rows]), (WHEELS,)),
+    Alteration("wheel_ends", "the left wheel's counts stay, in the second half", on([WHEELS], stuck_left_wheel), (WHEELS,)),
+    Alteration("beams_exchanged", "first and last beam exchanged", on([BEAMS], exchanged(1, 3)), (BEAMS,)),
+    Alteration("begins_late", "without the first third: it starts in motion", begin_late),
+]
+
+
+def altered(recording, alteration, folder):
+    """A copy of the recording with the alteration in it, at `folder`, which is made anew; nothing where it lacks a sensor."""
+    if not all((recording / "mav0" / sensor / "data.csv").exists() for sensor in alteration.needs):
+        return None
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    alteration.alter(Copy(recording, folder))
+    return folder
+
+
+def cell(result):
+    """What one run came to: ATE and false tracking, or "none" where there is no estimate."""
+    if result is None:
+        return ""
+    if result["error"]:
+        return "none"
+    figures = result["figures"]
+    if figures is None or figures.get("ate_rmse_m") is None:
+        return "-"
+    false = figures["false_tracking"]["percent"]
+    return f"{figures['ate_rmse_m']:.3g}" + (f", **{false:.1f} %**" if false > 0.05 else "")
+
+
+def table(results, names):
+    """Markdown; `results`: by alteration, then by recording."""
+    lines = ["| | " + " | ".join(names) + " |", "|---" * (len(names) + 1) + "|"]
+    for alteration in ALTERATIONS:
+        if alteration.name not in results:
+            continue
+        row = results[alteration.name]
+        lines.append(f"| `{alteration.name}`: {alteration.what} | " + " | ".join(cell(row.get(name)) for name in names) + " |")
+    return "\n".join(lines)
