@@ -14,7 +14,7 @@ namespace {
 constexpr double kGate = 6.0;  // [sigma] of wheels and beams, once there is a solution
 constexpr int kFirst = 12;     // iterations
 constexpr int kNext = 6;
-constexpr int kRounds = 3;
+constexpr int kWhole = 3;         // rounds
 constexpr double kLasting = 1.1;  // of the features' errors, from which on they are weighed anew
 constexpr double kLeftOut = 4.0;  // [s] of a drive: standing before the start
 constexpr double kLate = 5e-3;    // [s] of the cameras' clock: further, the body does not turn at an even rate
@@ -43,12 +43,12 @@ void solve(Batch& batch, const Settings& settings, int iterations, const std::st
 /// Returns the residuals before the first step.
 std::vector<Residual> minimise(Batch& batch, const Settings& settings) {
   std::vector<Residual> before;
-  for (int round = 0; round < kRounds; ++round) {
+  for (int round = 0; round < settings.rounds; ++round) {
     batch.build(round == 0 ? 0.0 : kGate);
     if (round == 0) before = residuals_of(batch);
     solve(batch, settings, round == 0 ? kFirst : kNext,
-          "round " + std::to_string(round + 1) + " of " + std::to_string(kRounds));
-    if (round + 1 < kRounds) batch.learn_noise();
+          "round " + std::to_string(round + 1) + " of " + std::to_string(settings.rounds));
+    if (round + 1 < settings.rounds) batch.learn_noise();
   }
   return before;
 }
@@ -96,7 +96,7 @@ Information known(Batch& batch, const Settings& settings) {
 /// The covariance, where need be after features were given the weight that they deserve beside the other sensors.
 Eigen::MatrixXd weighed(Batch& batch, const Settings& settings) {
   const Information first = known(batch, settings);
-  if (first.lasting < kLasting) return first.covariance;
+  if (first.lasting < kLasting || settings.rounds < kWhole) return first.covariance;
   batch.weigh_pixels(first.lasting);
   batch.build(kGate);
   solve(batch, settings, kNext, "weight of features");

@@ -28,6 +28,7 @@ struct Settings {
   double interval = 0.2;  ///< [s] between keyframes
   Noise noise;
   int threads = 2;
+  int rounds = 3;  ///< solutions, each with the noise by the one before; fewer: a preview
   /// What the drives must have brought a standard deviation down to, of its prior, for a value to be changed.
   double shown_below = 0.7;
   std::function<void(const std::string&)> progress;  ///< may be empty

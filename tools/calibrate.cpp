@@ -6,14 +6,12 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "calibration/allan.h"
 #include "calibration/calibrate.h"
-#include "calibration/stated.h"
 #include "calibration/wanted_motion.h"
 #include "src/recording/calibration_files.h"
 #include "src/recording/calibration_writer.h"
@@ -24,6 +22,7 @@
 #include "tools/calibration/board_start.h"
 #include "tools/calibration/recorded_drive.h"
 #include "tools/calibration/report.h"
+#include "tools/calibration/result_files.h"
 #include "tools/calibration/result_text.h"
 #include "tools/commands.h"
 #include "tools/input_options.h"
@@ -54,26 +53,6 @@ struct CalibrateArguments {
 };
 
 constexpr double kDegree = 3.14159265358979323846 / 180.0;
-
-void write_text(const fs::path& file, const std::string& text) {
-  std::ofstream stream(file);
-  stream << text;
-  stream.close();
-  if (!stream) throw InputError(located(file, 0, "", "cannot be written"));
-}
-
-/// Of each beam, the mean of its axes.
-std::vector<BeamSigma> beam_sigmas(const calibration::Result& result) {
-  std::vector<BeamSigma> sigmas;
-  if (!result.calibration.lasers) return sigmas;
-  for (const LaserBeam& beam : result.calibration.lasers->beams) {
-    const auto mean = [&](const std::string& what) {
-      return calibration::mean_sigma(result.findings, "laser0 " + beam.name + ": " + what).value_or(0.0);
-    };
-    sigmas.push_back({1e-3 * mean("origin"), kDegree * mean("direction")});
-  }
-  return sigmas;
-}
 
 calibration::Drive read_drive(const fs::path& path, const CalibrateArguments& args, const Config& config,
                               std::optional<Calibration>& given, Progress& progress) {
@@ -113,12 +92,9 @@ void calibrate_drives(const CalibrateArguments& args) {
   const calibration::Result result = calibration::calibrate(*given, calibration::priors_of(*given), drives, settings);
   progress.finish();
 
-  fs::create_directories(args.out);
-  write_calibration(result.calibration, args.out, "by ear calibrate", beam_sigmas(result));
-  const std::string text = calibration::to_text(result);
-  write_text(args.out / "calibration.txt", text);
-  write_text(args.out / "calibration.json", calibration::to_json(result));
-  if (!args.report.empty()) write_text(args.report, calibration::to_html(args.recordings.front().string(), result));
+  const std::string text = calibration::write_result(result, args.out);
+  if (!args.report.empty())
+    calibration::write_text(args.report, calibration::to_html(args.recordings.front().string(), result));
   const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
   std::printf("%s%.1f s: %s\n", text.c_str(), taken.count(), args.out.c_str());
 }
@@ -144,7 +120,7 @@ void calibrate_imu(const CalibrateArguments& args) {
     text += calibration::to_text(*motion);
   }
   fs::create_directories(args.out);
-  write_text(args.out / "imu_noise.json", calibration::to_json(noise, motion));
+  calibration::write_text(args.out / "imu_noise.json", calibration::to_json(noise, motion));
   std::printf("%s%s\n", text.c_str(), (args.out / "imu_noise.json").c_str());
 }
 
@@ -229,10 +205,10 @@ void calibrate_cameras(const CalibrateArguments& args) {
   std::string text = calibration::to_text(result) + scale_check(known, result.calibration);
   if (!known)
     text += "Where the cameras sit in the body a board does not show: state T_BS of cam0, then ear calibrate\n";
-  write_text(args.out / "calibration.txt", text);
-  write_text(args.out / "calibration.json", calibration::to_json(result));
+  calibration::write_text(args.out / "calibration.txt", text);
+  calibration::write_text(args.out / "calibration.json", calibration::to_json(result));
   const fs::path report = args.report.empty() ? args.out / "report.html" : args.report;
-  write_text(report, calibration::to_html(args.cameras.string(), result));
+  calibration::write_text(report, calibration::to_html(args.cameras.string(), result));
   std::printf("%s%s\n", text.c_str(), args.out.c_str());
 }
 
