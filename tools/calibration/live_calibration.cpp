@@ -63,7 +63,7 @@ void LiveCalibration::hand_over() {
 }
 
 void LiveCalibration::run() {
-  ::setpriority(PRIO_PROCESS, 0, 19);  // of this thread alone, on Linux
+  ::setpriority(PRIO_PROCESS, 0, 10);  // of this thread alone, on Linux
   double estimated = 0.0;
   bool told = false;
   Settings quick;
