@@ -1,4 +1,4 @@
-"""ear calibrate --cameras on rendered images of a board, and on what is none.
+"""ear calibrate --cameras on rendered images of a board, and on what is none; ear live --calibrate.
 
 test_calibrate_board.py EAR_PROGRAM [TEST...].
 """
@@ -115,6 +115,31 @@ class Board(unittest.TestCase):
         self.refused(self.recording, "no dictionary", "--dictionary", "DICT_1X1")
         self.refused(self.recording, "more markers", "--board", "20x20")
         self.refused(self.recording, "no markers", "--dictionary", "DICT_7X7_50")
+
+
+class Live(unittest.TestCase):
+    def test_files_at_the_end_and_the_same_estimates(self):
+        with tempfile.TemporaryDirectory() as folder:
+            root = Path(folder)
+            made = run("simulate", "flat1", "--no-images", "--duration", "9", "--out", root / "drive")
+            self.assertEqual(made.returncode, 0, made.stderr)
+            for camera in ("cam0", "cam1"):
+                shutil.rmtree(root / "drive/mav0" / camera)
+            done = run("live", "--sensors", root / "drive", "--calibrate", root / "found", "--out", root / "live")
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertIn("calibration: the whole estimate", done.stderr)
+            self.assertEqual(run("run", root / "drive", "--out", root / "run").returncode, 0)
+            # What listens changes nothing.
+            self.assertEqual((root / "live/estimate.tum").read_bytes(), (root / "run/estimate.tum").read_bytes())
+            found = json.loads((root / "found/calibration.json").read_text(encoding="utf-8"))
+            separation = [entry for entry in found["parameters"] if "separation" in entry["name"]]
+            self.assertEqual(len(separation), 1)
+            self.assertTrue((root / "found/encoder0/sensor.yaml").is_file())
+
+    def test_not_with_a_view(self):
+        done = run("live", "--sensors", "/", "--calibrate", "x", "--check")
+        self.assertNotEqual(done.returncode, 0)
+        self.assertIn("--check", done.stderr)
 
 
 if __name__ == "__main__":
