@@ -7,23 +7,10 @@
 #include <vector>
 
 #include "calibration/batch.h"
+#include "calibration/findings.h"
 #include "calibration/residuals.h"
 
 namespace ear::calibration {
-
-/// What became of one number.
-struct Finding {
-  std::string name;  ///< "encoder0: wheel radius, mean"
-  std::string unit;  ///< of all that follows
-  double given = 0.0;
-  double change = 0.0;         ///< calibrated less given; 0 where the given value stays
-  double prior = 0.0;          ///< standard deviation before
-  double posterior = 0.0;      ///< standard deviation after
-  bool shown = true;           ///< false: the drives did not show it, and the given value stays
-  std::string entangled_with;  ///< the entry of the largest correlation
-  double correlation = 0.0;    ///< of it
-  std::string motion_wanted;   ///< what would show it; empty where it was shown
-};
 
 struct Result {
   Calibration calibration;  ///< with the standard deviations stated
@@ -41,6 +28,7 @@ struct Settings {
   double interval = 0.2;  ///< [s] between keyframes
   Noise noise;
   int threads = 2;
+  int rounds = 3;  ///< solutions, each with the noise by the one before; fewer: a preview
   /// What the drives must have brought a standard deviation down to, of its prior, for a value to be changed.
   double shown_below = 0.7;
   std::function<void(const std::string&)> progress;  ///< may be empty

@@ -35,7 +35,8 @@ class JetFactor final : public ceres::SizedCostFunction<kResiduals, kBlocks...> 
  public:
   explicit JetFactor(Model model) : model_(std::move(model)) {}
 
-  bool Evaluate(double const* const* blocks, double* residual, double** jacobians) const override {
+  /// Flattened: left to itself the compiler calls a function for each operation on a jet.
+  [[gnu::flatten]] bool Evaluate(double const* const* blocks, double* residual, double** jacobians) const override {
     if (jacobians == nullptr) {
       model_(values<double>(blocks), residual);
       return true;

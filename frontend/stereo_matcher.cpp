@@ -16,7 +16,9 @@ constexpr double kMaxDisparityShare = 0.2;     // of the image's width
 constexpr float kMinSearchCorrelation = 0.5F;  // on the search level
 constexpr float kRivalMargin = 0.1F;           // a second peak this close to the first is looked at as well
 constexpr float kAmbiguous = 0.03F;            // two places that differ less are not distinguished
-constexpr double kMaxEpipolarPx = 2.5;         // calibrations are off by more than patches are
+constexpr double kMaxEpipolarPx = 2.5;         // calibrations are off by more than patches are, unless they say how far
+constexpr double kWidestEpipolarPx = 12.0;     // beyond that other things are found
+constexpr double kLinesApartPx = 4.0;          // where features may lie far off their lines
 constexpr double kMinDisparityPx = -0.7;       // noise of a point at infinity
 constexpr double kMaxDepthJumpPx = 1.5;        // disparity against what was carried over, plus
 constexpr double kMaxDepthJumpShare = 0.1;     // this share of the disparity
@@ -30,8 +32,11 @@ class Peaks {
     rising_ = !last_ || next.correlation >= last_->correlation;
     last_ = next;
   }
+  /// Of one line; another may follow.
   void end() {
     if (last_ && rising_) keep(*last_);
+    last_.reset();
+    rising_ = false;
   }
   /// Those that are missing have a correlation of -1.
   [[nodiscard]] const std::array<Hypothesis, 2>& best() const { return best_; }
@@ -52,10 +57,17 @@ class Peaks {
   std::array<Hypothesis, 2> best_;
 };
 
+/// How far features may lie off their epipolar lines [px], by what is stated of the right camera's rotation.
+double epipolar_band(const CameraCalibration& right) {
+  constexpr double kSigmas = 3.0;
+  const double rotation = right.pose_sigma ? right.pose_sigma->rotation : 0.0;
+  return std::clamp(kSigmas * rotation * right.fv, kMaxEpipolarPx, kWidestEpipolarPx);
+}
+
 }  // namespace
 
 StereoMatcher::StereoMatcher(const CameraCalibration& left, const CameraCalibration& right, double nearest_depth)
-    : left_lens_(left), right_lens_(right) {
+    : left_lens_(left), right_lens_(right), epipolar_band_px_(epipolar_band(right)) {
   const Eigen::Isometry3d T_C1C0 = right.T_BC.inverse() * left.T_BC;
   right_from_left_ = {T_C1C0.linear(), T_C1C0.translation()};
   const double baseline = T_C1C0.translation().norm();
@@ -72,6 +84,14 @@ std::optional<Eigen::Vector2d> StereoMatcher::project(const Eigen::Vector2d& lef
   return right_lens_.to_pixel(point.hnormalized());
 }
 
+Eigen::Vector2d StereoMatcher::across_line(const Eigen::Vector2d& left) const {
+  const auto far = project(left, 0.0);
+  const auto near = project(left, 0.25 * max_inverse_depth_);
+  if (!far || !near || *far == *near) return Eigen::Vector2d::UnitY();
+  const Eigen::Vector2d along = (*near - *far).normalized();
+  return {-along.y(), along.x()};
+}
+
 // `start` is what `surface` made expect. Where the patch came out more sheared than that along the epipolar line, the
 // surface patch leans more.
 std::optional<StereoMatch> StereoMatcher::accept(const ReferencePatch::Match& match, const Warp& start,
@@ -81,7 +101,7 @@ std::optional<StereoMatch> StereoMatcher::accept(const ReferencePatch::Match& ma
   if (!right) return std::nullopt;
   const auto point = intersect(right_from_left_, left, *right);
   if (!point) return std::nullopt;
-  if (point->epipolar_distance * right_lens_.focal_px() > kMaxEpipolarPx) return std::nullopt;
+  if (point->epipolar_distance * right_lens_.focal_px() > epipolar_band_px_) return std::nullopt;
   if (point->inverse_depth < kMinDisparityPx * inverse_depth_per_pixel_) return std::nullopt;
 
   const Eigen::Matrix2d unexpected = ((match.warp.affine - start.affine) * left_warp.affine.inverse()).cast<double>();
@@ -97,7 +117,7 @@ std::optional<StereoMatch> StereoMatcher::follow(const ImagePyramid& right, cons
                                                  const SurfacePatch& surface) const {
   const auto start = carry_over(left_warp, left, surface, right_from_left_, left_lens_, right_lens_);
   if (!start) return std::nullopt;
-  const auto match = patch.align(right, *start, 0);
+  const auto match = patch.align(right, *start, epipolar_band_px_ > kMaxEpipolarPx ? kRefineLevel : 0);
   if (!match) return std::nullopt;
   const auto accepted = accept(*match, *start, left_warp, left, surface);
   if (!accepted) return std::nullopt;
@@ -122,13 +142,22 @@ std::optional<StereoMatch> StereoMatcher::search(const ImagePyramid& right, cons
 
   Peaks<Hypothesis> peaks;
   const double step = kSearchStepPx * inverse_depth_per_pixel_;
-  for (double inverse_depth = 0.0; inverse_depth <= max_inverse_depth_; inverse_depth += step) {
-    const auto pixel = project(left, inverse_depth);
-    if (!pixel) continue;
-    const auto correlation = patch.correlate(right, at(*pixel), level);
-    if (correlation) peaks.add({*pixel, *correlation});
+  const auto along_line = [&](const Eigen::Vector2d& aside) {
+    for (double inverse_depth = 0.0; inverse_depth <= max_inverse_depth_; inverse_depth += step) {
+      const auto pixel = project(left, inverse_depth);
+      if (!pixel) continue;
+      const Eigen::Vector2d beside = *pixel + aside;
+      const auto correlation = patch.correlate(right, at(beside), level);
+      if (correlation) peaks.add({beside, *correlation});
+    }
+    peaks.end();
+  };
+  along_line(Eigen::Vector2d::Zero());
+  const Eigen::Vector2d across = across_line(left);
+  for (double aside = kLinesApartPx; aside < epipolar_band_px_; aside += kLinesApartPx) {
+    along_line(aside * across);
+    along_line(-aside * across);
   }
-  peaks.end();
 
   std::optional<ReferencePatch::Match> best;
   for (const Hypothesis& peak : peaks.best()) {

@@ -23,7 +23,8 @@ class StereoMatcher {
  public:
   static constexpr int kLevels = 3;  ///< of the right image's pyramid that are looked at
 
-  /// `nearest_depth` [m]: closer points are not searched for.
+  /// `nearest_depth` [m]: closer points are not searched for. Features may lie 2.5 px off their epipolar lines; where
+  /// the right camera states a standard deviation of its rotation, three of these, if that is more, but 12 px at most.
   StereoMatcher(const CameraCalibration& left, const CameraCalibration& right, double nearest_depth);
 
   /// Follows a match known from before: starts where `surface` predicts it. Nothing if the patch is not there, off the
@@ -50,8 +51,12 @@ class StereoMatcher {
                                                   const Warp& left_warp, const Eigen::Vector2d& left,
                                                   const SurfacePatch& surface) const;
 
+  /// Unit vector across the epipolar line, in the right image.
+  [[nodiscard]] Eigen::Vector2d across_line(const Eigen::Vector2d& left) const;
+
   Lens left_lens_;
   Lens right_lens_;
+  double epipolar_band_px_;
   Transfer right_from_left_;
   double max_inverse_depth_;
   double inverse_depth_per_pixel_;

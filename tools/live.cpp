@@ -3,6 +3,8 @@
 
 #include <signal.h>
 
+#include <cmath>
+#include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -16,6 +18,10 @@
 #include "tools/live_view.h"
 #include "tools/opened_recording.h"
 #include "tools/program_config.h"
+#ifdef EAR_WITH_CALIBRATION
+#include "tools/calibration/live_calibration.h"
+#include "tools/calibration/result_files.h"
+#endif
 
 namespace ear::tools {
 namespace {
@@ -25,7 +31,46 @@ struct LiveArguments {
   std::filesystem::path sensors;
   live::SessionOptions session;
   ViewArguments view;
+  std::filesystem::path calibrate;
 };
+
+#ifdef EAR_WITH_CALIBRATION
+/// --calibrate: listens to the estimator, and writes a calibration at the end.
+class CalibrationRun {
+ public:
+  CalibrationRun(const std::filesystem::path& folder, const Calibration& calibration, const Config& config)
+      : folder_(folder), live_(calibration, settings_of(config), [](const std::string& words) { log_info(words); }) {}
+
+  [[nodiscard]] live::Onlooker onlooker() {
+    return {live_.make(), {}, [this](const live::LiveFrame&, const Odometry&) { live_.hand_over(); }};
+  }
+
+  void finish() {
+    log_info("calibration: the whole estimate, from " + std::to_string(std::lround(live_.recorded())) + " s");
+    const std::string text = calibration::write_result(live_.finish(), folder_);
+    std::printf("%s%s\n", text.c_str(), folder_.c_str());
+  }
+
+ private:
+  static calibration::LiveCalibrationSettings settings_of(const Config& config) {
+    calibration::LiveCalibrationSettings settings;
+    settings.filter = config.filter;
+    return settings;
+  }
+
+  std::filesystem::path folder_;
+  calibration::LiveCalibration live_;
+};
+#else
+class CalibrationRun {
+ public:
+  CalibrationRun(const std::filesystem::path&, const Calibration&, const Config&) {
+    throw InputError("--calibrate: this program was built without Ceres (Debian: libceres-dev)");
+  }
+  [[nodiscard]] static live::Onlooker onlooker() { return {}; }
+  static void finish() {}
+};
+#endif
 
 /// SIGINT and SIGTERM are taken from a queue, by the main thread; all threads that begin later inherit that.
 class StopSignals {
@@ -97,14 +142,19 @@ void run_live(const LiveArguments& args) {
   const live::SensorFiles files(*calibration, folder_of(args, settings));
   std::optional<LiveView> view;
   if (args.view.port >= 0) view.emplace(args.view, title_of(args), files.read());
+  std::optional<CalibrationRun> calibrates;
+  if (!args.calibrate.empty()) calibrates.emplace(args.calibrate, files.read(), settings.estimator);
   live::Session session(args.session, settings, files.read(), files.folder(), ros.get(), player.get(),
-                        view ? view->onlooker() : live::Onlooker{});
+                        view         ? view->onlooker()
+                        : calibrates ? calibrates->onlooker()
+                                     : live::Onlooker{});
   const std::string reason = session.run([&] { return signals.wait(); }, notifier);
   notifier.stopping();
   log_info("stops: " + reason);
   session.stop();
   if (view) log_info(view->finish());
   session.judge();
+  if (calibrates) calibrates->finish();
 }
 
 }  // namespace
@@ -126,6 +176,12 @@ void add_live_command(CLI::App& app) {
       "--check", session.check,
       "Before a flight, by hand: lift, push, turn and roll the vehicle, and see whether its sensors agree");
   add_view_options(*command, args->view);
+  command
+      ->add_option("--calibrate", args->calibrate,
+                   "Say while driving what the calibration still lacks, and write it to this folder at the end "
+                   "(docs/calibration.md)")
+      ->excludes("--check")
+      ->excludes("--view");
   if (const std::string missing = live::missing_ros_parts(); !missing.empty())
     command->footer("Not in this program: " + missing);
   command->callback([args] { run_live(*args); });

@@ -67,26 +67,6 @@ std::string triple(const Eigen::Vector3d& v) {
   return text.str();
 }
 
-void write_camera(const Calibration& calibration, std::size_t index, const fs::path& folder,
-                  const std::string& heading) {
-  const CameraCalibration& camera = calibration.cameras[index];
-  SensorFile file(folder, "cam" + std::to_string(index), heading);
-  file.pose(camera.T_BC);
-  file.sigma(index == 0 ? "T_BS_sigma" : "T_C0C1_sigma", camera.pose_sigma);
-  if (camera.rate_hz > 0.0) file.value("rate_hz", camera.rate_hz);
-  file.list("resolution", std::array<int, 2>{camera.width, camera.height}, 2);
-  file.value("camera_model", "pinhole");
-  file.list("intrinsics", std::array<double, 4>{camera.fu, camera.fv, camera.cu, camera.cv}, 4, "fu, fv, cu, cv");
-  const bool equidistant = camera.lens == LensModel::equidistant;
-  file.value("distortion_model", equidistant ? "equidistant" : "radial-tangential");
-  file.list("distortion_coefficients", camera.distortion, camera.distortion[4] != 0.0 && !equidistant ? 5 : 4);
-  if (index == 0) {
-    file.value("timeshift_cam_imu", calibration.camera_time_offset, "s");
-    file.sigma("timeshift_cam_imu_sigma", calibration.camera_time_offset_sigma, "s");
-  }
-  file.close();
-}
-
 void write_imu(const ImuCalibration& imu, const fs::path& folder, const std::string& heading) {
   SensorFile file(folder, "imu0", heading);
   file.pose(Eigen::Isometry3d::Identity());
@@ -138,6 +118,26 @@ void write_lasers(const LaserCalibration& lasers, const fs::path& folder, const 
 }
 
 }  // namespace
+
+void write_camera(const Calibration& calibration, std::size_t index, const fs::path& folder,
+                  const std::string& heading) {
+  const CameraCalibration& camera = calibration.cameras[index];
+  SensorFile file(folder, "cam" + std::to_string(index), heading);
+  file.pose(camera.T_BC);
+  file.sigma(index == 0 ? "T_BS_sigma" : "T_C0C1_sigma", camera.pose_sigma);
+  if (camera.rate_hz > 0.0) file.value("rate_hz", camera.rate_hz);
+  file.list("resolution", std::array<int, 2>{camera.width, camera.height}, 2);
+  file.value("camera_model", "pinhole");
+  file.list("intrinsics", std::array<double, 4>{camera.fu, camera.fv, camera.cu, camera.cv}, 4, "fu, fv, cu, cv");
+  const bool equidistant = camera.lens == LensModel::equidistant;
+  file.value("distortion_model", equidistant ? "equidistant" : "radial-tangential");
+  file.list("distortion_coefficients", camera.distortion, camera.distortion[4] != 0.0 && !equidistant ? 5 : 4);
+  if (index == 0) {
+    file.value("timeshift_cam_imu", calibration.camera_time_offset, "s");
+    file.sigma("timeshift_cam_imu_sigma", calibration.camera_time_offset_sigma, "s");
+  }
+  file.close();
+}
 
 void write_calibration(const Calibration& calibration, const fs::path& folder, const std::string& heading,
                        const std::vector<BeamSigma>& beams) {

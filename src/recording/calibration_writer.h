@@ -21,4 +21,8 @@ struct BeamSigma {
 void write_calibration(const Calibration& calibration, const std::filesystem::path& folder, const std::string& heading,
                        const std::vector<BeamSigma>& beams);
 
+/// The file of one camera alone.
+void write_camera(const Calibration& calibration, std::size_t index, const std::filesystem::path& folder,
+                  const std::string& heading);
+
 }  // namespace ear

@@ -156,6 +156,33 @@ TEST_CASE("stereo: what is off the epipolar line is not a match") {
   CHECK(result.found < 0.03 * result.tried);
 }
 
+TEST_CASE("stereo: off the epipolar line, as far as the right camera says that it may be turned") {
+  Pair pair({wall(1.0, 14)});
+  const std::vector<CameraCalibration> truth = pair.cameras;
+  pair.cameras[1].T_BC.rotate(Eigen::AngleAxisd(0.03, Eigen::Vector3d::UnitX()));  // the images are 6 px too high
+  pair.cameras[1].pose_sigma = PoseSigma{0.02, 1e-4};
+  const StereoMatcher matcher(pair.cameras[0], pair.cameras[1], kNearest);
+  const Lens lens(truth[0]);
+  const Lens right_lens(truth[1]);
+  int tried = 0, right = 0, followed = 0;
+  for (const Corner& corner : Detector(320, 240, 100).detect(pair.left, {}, 100)) {
+    ReferencePatch patch;
+    const auto ray = lens.to_normalized(corner.pixel.cast<double>());
+    if (!ray || !patch.capture(pair.left, corner.pixel)) continue;
+    const auto point = hit(Eigen::Isometry3d::Identity(), *ray, pair.scene);
+    const auto seen = right_lens.to_pixel((truth[1].T_BC.inverse() * *point).hnormalized());
+    if (!seen || seen->x() < 15.0 || seen->y() < 15.0 || seen->x() > 304.0 || seen->y() > 224.0) continue;
+    ++tried;
+    const auto match = matcher.search(pair.right, patch, {corner.pixel}, *ray);
+    if (!match || (*right_lens.to_pixel(match->right) - *seen).norm() > 0.5) continue;
+    ++right;
+    if (matcher.follow(pair.right, patch, {corner.pixel}, *ray, match->surface)) ++followed;
+  }
+  CHECK(tried > 60);
+  CHECK(right > 0.9 * tried);
+  CHECK(followed > 0.9 * right);
+}
+
 TEST_CASE("stereo: what is followed must be where it was") {
   const Pair pair({wall(1.0, 13)});
   const StereoMatcher matcher(pair.cameras[0], pair.cameras[1], kNearest);

@@ -1,13 +1,28 @@
 #include "tools/calibration/recorded_drive.h"
 
+#include <cmath>
 #include <stdexcept>
 
 #include "calibration/drive_recorder.h"
+#include "calibration/parameters.h"
 #include "src/odometry_factory.h"
 #include "tools/evaluation/read.h"
 #include "tools/replay.h"
 
 namespace ear::calibration {
+namespace {
+
+/// What the right camera may be off by, with both principal points: so far from its epipolar line a feature is sought.
+Calibration for_search(Calibration calibration) {
+  if (calibration.cameras.size() < 2) return calibration;
+  const Priors priors = priors_of(calibration);
+  CameraCalibration& right = calibration.cameras[1];
+  const double lens = std::sqrt(2.0) * priors.principal_point / right.fv;
+  right.pose_sigma = PoseSigma{std::hypot(priors.stereo_rotation, lens), priors.stereo_position};
+  return calibration;
+}
+
+}  // namespace
 
 Drive recorded_drive(Recording& recording, const std::string& name, const Config& config,
                      const std::function<void(double)>& progress) {
@@ -16,7 +31,7 @@ Drive recorded_drive(Recording& recording, const std::string& name, const Config
   const MakeEstimator make = [&drive](const FilterConfig& filter, const Calibration& calibration) {
     return std::make_unique<DriveRecorder>(filter, calibration, drive);
   };
-  Odometry odometry = OdometryFactory::make(config, recording.calibration(), make);
+  Odometry odometry = OdometryFactory::make(config, for_search(recording.calibration()), make);
   const TimeSpan span = recording.span();
   const double duration = seconds_between(span.first_ns, span.last_ns);
   tools::replay(recording, odometry, [&](const tools::ReplayedFrame& frame) {

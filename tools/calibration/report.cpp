@@ -204,4 +204,12 @@ std::string to_html(const std::string& title, const Result& result) {
   return page + "</main><div id=\"readout\"></div>\n<script>" + evaluation::kReportScript + "</script></body></html>\n";
 }
 
+std::string to_html(const std::string& title, const BoardResult& board) {
+  Result result;
+  result.calibration = board.calibration;
+  result.findings = board.findings;
+  result.after = board.residuals;
+  return to_html(title, result);
+}
+
 }  // namespace ear::calibration

@@ -24,6 +24,36 @@ std::string clock_line(const char* sensor, double offset) {
   return line("%s: add %.2f ms to its stamps; ear run takes them as they are\n", sensor, 1e3 * offset);
 }
 
+/// One line per number.
+std::string table_of(const std::vector<Finding>& findings) {
+  std::string text =
+      line("%-46s %11s %10s %9s %9s  %s\n", "", "given", "change", "known to", "before", "entangled with");
+  for (const Finding& finding : findings) {
+    const std::string change = finding.shown ? line("%+.4g", finding.change) : "kept";
+    text += line("%-46s %11.6g %10s %9.3g %9.3g  %s %.2f [%s]\n", finding.name.c_str(), finding.given, change.c_str(),
+                 finding.posterior, finding.prior, finding.entangled_with.c_str(), finding.correlation,
+                 finding.unit.c_str());
+  }
+  return text;
+}
+
+Json json_of(const std::vector<Finding>& findings) {
+  Json parameters = Json::array();
+  for (const Finding& finding : findings) {
+    parameters.push_back({{"name", finding.name},
+                          {"unit", finding.unit},
+                          {"given", finding.given},
+                          {"change", finding.change},
+                          {"prior_sigma", finding.prior},
+                          {"posterior_sigma", finding.posterior},
+                          {"shown", finding.shown},
+                          {"entangled_with", finding.entangled_with},
+                          {"correlation", finding.correlation},
+                          {"motion_wanted", finding.motion_wanted}});
+  }
+  return parameters;
+}
+
 const char* axis_name(std::size_t axis) {
   constexpr std::array kNames{"gyroscope x",     "gyroscope y",     "gyroscope z",
                               "accelerometer x", "accelerometer y", "accelerometer z"};
@@ -49,14 +79,7 @@ std::string yaml_line(const char* key, const std::optional<double>& value) {
 }  // namespace
 
 std::string to_text(const Result& result) {
-  std::string text =
-      line("%-46s %11s %10s %9s %9s  %s\n", "", "given", "change", "known to", "before", "entangled with");
-  for (const Finding& finding : result.findings) {
-    const std::string change = finding.shown ? line("%+.4g", finding.change) : "kept";
-    text += line("%-46s %11.6g %10s %9.3g %9.3g  %s %.2f [%s]\n", finding.name.c_str(), finding.given, change.c_str(),
-                 finding.posterior, finding.prior, finding.entangled_with.c_str(), finding.correlation,
-                 finding.unit.c_str());
-  }
+  std::string text = table_of(result.findings);
   bool any = false;
   for (const Finding& finding : result.findings) {
     if (finding.shown) continue;
@@ -73,25 +96,43 @@ std::string to_text(const Result& result) {
 }
 
 std::string to_json(const Result& result) {
-  Json parameters = Json::array();
-  for (const Finding& finding : result.findings) {
-    parameters.push_back({{"name", finding.name},
-                          {"unit", finding.unit},
-                          {"given", finding.given},
-                          {"change", finding.change},
-                          {"prior_sigma", finding.prior},
-                          {"posterior_sigma", finding.posterior},
-                          {"shown", finding.shown},
-                          {"entangled_with", finding.entangled_with},
-                          {"correlation", finding.correlation},
-                          {"motion_wanted", finding.motion_wanted}});
-  }
   const Json json{
-      {"parameters", parameters},
+      {"parameters", json_of(result.findings)},
       {"noise", {{"feature_px", result.noise.pixel}, {"slip", result.noise.roll.slip}, {"beam", result.noise.beam}}},
       {"encoder_time_offset", result.encoder_time},
       {"laser_time_offset", result.laser_time},
       {"left_out_s", result.left_out}};
+  return json.dump(1) + "\n";
+}
+
+std::string to_text(const BoardResult& result) {
+  const BoardCoverage& coverage = result.coverage;
+  std::string text = line("%-46s %11s %9s %9s  %s\n", "", "found", "known to", "start", "entangled with");
+  for (const Finding& finding : result.findings) {
+    text += line("%-46s %11.6g %9.3g %9.3g  %s %.2f [%s]\n", finding.name.c_str(), finding.given + finding.change,
+                 finding.posterior, finding.prior, finding.entangled_with.c_str(), finding.correlation,
+                 finding.unit.c_str());
+  }
+  text += line(
+      "%zu views, %zu corners within %.3f px (each coordinate), tilted by up to %.0f degrees, %.2f to %.2f m away\n",
+      result.views, result.residuals.size(), result.sigma_px, coverage.largest_tilt * 57.29577951308232,
+      coverage.nearest, coverage.farthest);
+  for (std::size_t i = 0; i < result.calibration.cameras.size(); ++i) {
+    text += line("cam%zu: %.0f %% of the image saw the board\n", i, 100.0 * coverage.covered[i]);
+  }
+  for (const std::string& words : result.advice) text += words + "\n";
+  return text;
+}
+
+std::string to_json(const BoardResult& result) {
+  const BoardCoverage& coverage = result.coverage;
+  const Json json{{"parameters", json_of(result.findings)},
+                  {"views", result.views},
+                  {"corners", result.residuals.size()},
+                  {"corner_sigma_px", result.sigma_px},
+                  {"largest_tilt_deg", coverage.largest_tilt * 57.29577951308232},
+                  {"distance_m", {coverage.nearest, coverage.farthest}},
+                  {"advice", result.advice}};
   return json.dump(1) + "\n";
 }
 

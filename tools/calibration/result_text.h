@@ -5,6 +5,7 @@
 #include <string>
 
 #include "calibration/allan.h"
+#include "calibration/board.h"
 #include "calibration/calibrate.h"
 
 namespace ear::calibration {
@@ -13,6 +14,10 @@ namespace ear::calibration {
 /// it.
 [[nodiscard]] std::string to_text(const Result& result);
 [[nodiscard]] std::string to_json(const Result& result);
+
+/// Lenses and stereo pose, what the views were like, and what the board's motion did not show.
+[[nodiscard]] std::string to_text(const BoardResult& result);
+[[nodiscard]] std::string to_json(const BoardResult& result);
 
 /// White noise and random walk of each axis with their uncertainty, and the lines for imu0/sensor.yaml.
 [[nodiscard]] std::string to_text(const ImuNoise& noise);

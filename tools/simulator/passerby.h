@@ -4,11 +4,8 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <cstdint>
-#include <opencv2/core.hpp>
 
-#include "ear/calibration.h"
 #include "tools/simulator/faults.h"
-#include "tools/simulator/image_sensor.h"
 #include "tools/simulator/scene.h"
 #include "tools/simulator/texture.h"
 #include "tools/simulator/trajectory.h"
@@ -39,11 +36,5 @@ class Passerby {
 
 /// What it looks like.
 [[nodiscard]] Texture paint_passerby(const Passerby& passerby, std::uint64_t seed);
-
-/// Puts it into a picture exposed around t [s], in grey levels (float), blurred as it and the camera move.
-/// `brightness` is vignetting().
-void draw_passerby(const Passerby& passerby, const Texture& texture, const CameraCalibration& camera,
-                   const Trajectory& trajectory, double t, const Exposure& exposure, const cv::Mat& brightness,
-                   cv::Mat& grey);
 
 }  // namespace ear::simulator

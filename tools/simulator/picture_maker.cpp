@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "tools/simulator/moving_panel.h"
 #include "tools/simulator/obstruction.h"
 #include "tools/simulator/sensors.h"
 
@@ -35,6 +36,7 @@ PictureMaker::PictureMaker(const Simulation& simulation)
   for (const Passerby& passerby : simulation.passersby()) {
     people_.push_back(paint_passerby(passerby, simulation.options().seed));
   }
+  if (simulation.board()) board_ = paint_board();
   for (const CameraCalibration& camera : simulation.true_calibration().cameras) {
     brightness_.push_back(vignetting(camera));
     rays_.push_back(make_rays(camera, Eigen::Vector2d::Zero()));
@@ -58,7 +60,12 @@ cv::Mat PictureMaker::make(const Shot& shot) const {
     for (std::size_t i = 0; i < people_.size(); ++i) {
       const Passerby& passerby = simulation_.passersby()[i];
       if (!passerby.fault().active(t)) continue;
-      draw_passerby(passerby, people_[i], camera, trajectory, t, exposure, brightness_[source.camera], grey);
+      draw_moving_panel([&](double instant) { return passerby.panel(instant); }, people_[i], camera, trajectory, t,
+                        exposure, brightness_[source.camera], grey);
+    }
+    if (board_ && simulation_.board()->held(t)) {
+      draw_moving_panel([&](double instant) { return simulation_.board()->panel(instant); }, *board_, camera,
+                        trajectory, t, exposure, brightness_[source.camera], grey);
     }
   }
   draw_obstruction(obstruction, rays_[source.camera], source.camera, t, grey);

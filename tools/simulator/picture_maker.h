@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <opencv2/core.hpp>
+#include <optional>
 #include <vector>
 
 #include "tools/simulator/camera_faults.h"
@@ -32,7 +33,8 @@ class PictureMaker {
   Appearance appearance_;
   Renderer renderer_;
   ImageSensor sensor_;
-  std::vector<Texture> people_;      // one per passer-by
+  std::vector<Texture> people_;  // one per passer-by
+  std::optional<Texture> board_;
   std::vector<cv::Mat> brightness_;  // per camera
   std::vector<PixelRays> rays_;      // per camera, through the pixels' centres
 };

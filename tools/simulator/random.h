@@ -24,7 +24,8 @@ enum class Stream : std::uint32_t {
   laser_faults = 10,
   obstruction = 11,
   faults = 12,
-  calibration_errors = 13
+  calibration_errors = 13,
+  board = 14
 };
 
 [[nodiscard]] inline Rng make_rng(std::uint64_t seed, Stream stream) {

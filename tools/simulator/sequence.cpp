@@ -375,9 +375,20 @@ Sequence circle() {
           0.0,       {stand(3.0), turn(1.0, 360, 0.7), stand(3.0)}};
 }
 
+// The board is shown while the vehicle hangs in the air: near the floor half of the board would be below it.
+Sequence board() {
+  Sequence sequence{
+      "board",        "hovers at a height of 1 m while somebody moves a ChArUco board before its cameras for 60 s",
+      Terrain(),      {6.0, 2.5},
+      90.0 * kDegree, {stand(2.0), take_off(1.0, 2.0), in_air(stand(63.0)), land(1.0), stand(1.0)}};
+  sequence.board = BoardShow{5.5, 65.5};
+  return sequence;
+}
+
 std::vector<Sequence> all_sequences() {
-  return {standing(), flat1(), flat2(), flat3(), wave1(),      wave2(),      wave3(),     slope(),    lawn(),  fly1(),
-          fly2(),     sway1(), sway2(), sway3(), occlusion1(), occlusion2(), calibrate(), straight(), circle()};
+  return {standing(),   flat1(),      flat2(),     flat3(),    wave1(),  wave2(), wave3(),
+          slope(),      lawn(),       fly1(),      fly2(),     sway1(),  sway2(), sway3(),
+          occlusion1(), occlusion2(), calibrate(), straight(), circle(), board()};
 }
 
 }  // namespace
@@ -390,7 +401,7 @@ std::vector<std::string> all_sequence_names() {
 
 std::vector<std::string> sequence_names() {
   std::vector<std::string> names = all_sequence_names();
-  for (const char* name : {"calibrate", "straight", "circle"}) {
+  for (const char* name : {"calibrate", "straight", "circle", "board"}) {
     names.erase(std::remove(names.begin(), names.end(), name), names.end());
   }
   return names;

@@ -39,6 +39,11 @@ struct Hindrance {
   double tufts = 0.0;                   ///< tufts of grass per second that pass before the lenses
 };
 
+/// A board with markers that somebody moves before the cameras (held_board.h).
+struct BoardShow {
+  double begin = 0.0, end = 0.0;  ///< [s]
+};
+
 struct Sequence {
   std::string name;
   std::string summary;  ///< one line for people
@@ -49,10 +54,11 @@ struct Sequence {
   Place place = Place::room;
   LaserFaults laser_faults = {};
   Hindrance hindrance = {};
+  std::optional<BoardShow> board = {};
 };
 
-/// The names that `find_sequence` knows, but for `calibrate`, `straight` and `circle`, which are for the calibration:
-/// those that estimators are compared on.
+/// The names that `find_sequence` knows, but for `calibrate`, `straight`, `circle` and `board`, which are for the
+/// calibration: /// those that estimators are compared on.
 [[nodiscard]] std::vector<std::string> sequence_names();
 /// All of them.
 [[nodiscard]] std::vector<std::string> all_sequence_names();

@@ -85,6 +85,13 @@ std::vector<Passerby> people_in(const Options& options, const Trajectory& trajec
   return people;
 }
 
+std::optional<HeldBoard> board_in(const Options& options, const Sequence& sequence, const MotionPlan& plan,
+                                  const CameraCalibration& camera) {
+  if (!sequence.board) return std::nullopt;
+  Rng rng = make_rng(options.seed, Stream::board);
+  return HeldBoard(*sequence.board, plan.trajectory, camera, rng);
+}
+
 Options without_faults(Options options) {
   options.faults.clear();
   return options;
@@ -141,6 +148,7 @@ Simulation::Simulation(const Options& options, const Sequence& sequence)
       wheel_faults_(options.faults, *plan_, wheels_, *true_calibration_.encoder),
       obstruction_(drawn_obstruction(options, sequence, plan_->trajectory.duration())),
       passersby_(people_in(options, plan_->trajectory, scene_)),
+      board_(board_in(options, sequence, *plan_, true_calibration_.cameras[0])),
       duration_(options.duration.value_or(plan_->trajectory.duration() - 0.2)) {
   const double end = kImuPhase + duration_;
   require_within(options.faults, end);

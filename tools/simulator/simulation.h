@@ -16,6 +16,7 @@
 #include "ear/types.h"
 #include "tools/simulator/camera_faults.h"
 #include "tools/simulator/faults.h"
+#include "tools/simulator/held_board.h"
 #include "tools/simulator/motion_plan.h"
 #include "tools/simulator/obstruction.h"
 #include "tools/simulator/passerby.h"
@@ -106,6 +107,8 @@ class Simulation {
   [[nodiscard]] const Obstruction& obstruction() const { return obstruction_; }
   /// Who crosses the view.
   [[nodiscard]] const std::vector<Passerby>& passersby() const { return passersby_; }
+  /// What somebody holds before the cameras; nothing but in `board`.
+  [[nodiscard]] const std::optional<HeldBoard>& board() const { return board_; }
   [[nodiscard]] const MotionPlan& plan() const { return *plan_; }
   [[nodiscard]] const Options& options() const { return options_; }
 
@@ -122,6 +125,7 @@ class Simulation {
   WheelFaults wheel_faults_;
   Obstruction obstruction_;
   std::vector<Passerby> passersby_;
+  std::optional<HeldBoard> board_;
   double duration_;
   std::vector<TimeNs> truth_times_;
   std::vector<ImuSample> imu_;
