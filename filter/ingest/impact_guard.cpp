@@ -6,7 +6,6 @@
 namespace ear {
 namespace {
 
-constexpr double kSpread = 4.0;        // deviations from the mean, in standard deviations, are ordinary
 constexpr double kAccelShare = 0.1;    // of a deviation: bandwidth, scale and timing make that much of it wrong
 constexpr double kGyroShare = 1.0;     // no body turns so suddenly: as much as a limit that is not known yet may hide
 constexpr double kLongest = 0.06;      // [s] a longer deviation is no strike, but how the vehicle moves
@@ -25,7 +24,7 @@ double ExcessWatch::add(const Eigen::Vector3d& value, double dt) {
   }
   const Eigen::Vector3d deviation = value - mean_;
   const double distance = deviation.norm();
-  const double ordinary = std::max(least_, kSpread * std::sqrt(variance_));
+  const double ordinary = std::max(least_, kOrdinary * std::sqrt(variance_));
   const bool cut_off = clips_ = clipped(value);
   last_ = value;
 

@@ -12,6 +12,9 @@
 
 namespace ear {
 
+/// Standard deviations of what an inertial sensor does: less is ordinary.
+inline constexpr double kOrdinary = 4.0;
+
 /// Watches one sensor of three axes.
 class ExcessWatch {
  public:

@@ -6,17 +6,15 @@
 namespace ear {
 namespace {
 
-constexpr double kGravity = 9.81;       // [m/s^2]
 constexpr double kFreeFall = 3.0;       // [m/s^2] less specific force than this, and nothing carries the vehicle
 constexpr double kFallDuration = 0.04;  // [s]
 constexpr double kConfirmation = 0.1;   // [s] for which a strike or driven wheels confirm
 constexpr double kJustNow = 0.3;        // [s] the distance rolled in this time counts for the tolerance
-constexpr double kFullWay = 0.2;        // [m] of it, and the ground may be as uneven as it gets
-constexpr double kLevelSigma = 0.02;    // [m] of the wheels' height over the plane, on the ground
-constexpr double kLevelWay = 0.2;   // [m] over which this height changes; the sight of it is renewed ten times as often
-constexpr double kLevelTime = 2.0;  // [s] the same for a vehicle at rest
-constexpr double kLongestStep = 0.1;    // [s] between inertial samples
-constexpr double kAirSpeed = 1.0;       // [m/s] at which the ground passes below a flying vehicle
+constexpr double kOtherGround = 0.2;    // [m] over which the ground becomes another
+constexpr double kLevelSigma = 0.02;  // [m] of the wheels' height over the plane; the beams see it ten times meanwhile
+constexpr double kLevelTime = 2.0;    // [s] the same for a vehicle at rest
+constexpr double kLongestStep = 0.1;  // [s] between inertial samples
+constexpr double kAirSpeed = 1.0;     // [m/s] at which the ground passes below a flying vehicle
 constexpr double kFirstDuration = 0.1;  // [s] of evidence for the first mode
 constexpr double kSilence = 0.3;        // [s] without a reading that agrees, and the beams show nothing
 constexpr double kHeightKnown = 0.05;   // [m]
@@ -56,7 +54,7 @@ ContactEvent ContactDetector::add_imu(const ImuSample& sample) {
   } else if (falling_since_ns_ == kNever) {
     falling_since_ns_ = sample.t_ns;
   }
-  if (std::abs(force - kGravity) > config_.strike) {
+  if (std::abs(force + kGravity_W.z()) > config_.strike) {
     strike_ns_ = sample.t_ns;
     ground_->strike();
   }
@@ -91,16 +89,16 @@ void ContactDetector::roll(const WheelWatch::Motion& motion) {
   recent_way_ = recent_way_ * std::exp(-motion.dt / kJustNow) + motion.distance;
   if (mode_ != ContactMode::ground) return;
   ground_->move(motion.distance);
-  const double renewals = motion.distance / (0.1 * kLevelWay) + motion.dt / kLevelTime;
+  const double renewals = motion.distance / (0.1 * kOtherGround) + motion.dt / kLevelTime;
   ground_->suppose_height(level_, kLevelSigma / std::sqrt(renewals));
-  const double share = 1.0 - std::exp(-motion.distance / kLevelWay - motion.dt / kLevelTime);
+  const double share = 1.0 - std::exp(-motion.distance / kOtherGround - motion.dt / kLevelTime);
   const double level = level_ + share * (ground_->height() - level_);
   level_ = std::clamp(level, -config_.touchdown_height, config_.touchdown_height);
 }
 
 /// How far the wheels may seem to be above `level_` without being in the air.
 double ContactDetector::tolerance(bool all_agree) const {
-  const double unknown = all_agree ? std::min(1.0, recent_way_ / kFullWay) : 1.0;
+  const double unknown = all_agree ? std::min(1.0, recent_way_ / kOtherGround) : 1.0;
   return config_.takeoff_height + config_.unevenness * unknown;
 }
 
@@ -159,7 +157,7 @@ ContactEvent ContactDetector::change(ContactMode mode, TimeNs t_ns) {
   holds_since_ns_ = kNever;
   if (mode == ContactMode::ground) {
     level_ = std::clamp(ground_->height(), -config_.touchdown_height, config_.touchdown_height);
-    recent_way_ = kFullWay;  // on new ground
+    recent_way_ = kOtherGround;  // on new ground
   }
   if (first) return ContactEvent::none;
   return mode == ContactMode::ground ? ContactEvent::touchdown : ContactEvent::takeoff;

@@ -12,6 +12,7 @@
 #include "ear/calibration.h"
 #include "ear/filter_config.h"
 #include "ear/types.h"
+#include "filter/ekf/state.h"
 #include "filter/sources/ground/ground_tracker.h"
 #include "filter/sources/ground/wheel_watch.h"
 
