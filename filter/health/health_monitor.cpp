@@ -196,7 +196,7 @@ void HealthMonitor::decide(TimeNs t_ns) {
   const bool off = fresh && images_.come(t_ns) &&
                    ((last_.statistics.tracks >= kFewFeatures && last_.agreement.left > kMajority) || images_.misfit());
   if (!off || (fresh && wheels_carry(last_.statistics))) life_.fitting_ns = t_ns;
-  if (off || health_.aiding == Aiding::none || !last_.running) life_.doubtful_ns = t_ns;
+  if (off || health_.aiding == Aiding::none || !last_.running) life_.unproven_ns = t_ns;
   life_.contradicted = last_.running && seconds_between(life_.fitting_ns, t_ns) > kContradicted;
 
   health_.faulty.reset();
@@ -208,7 +208,7 @@ void HealthMonitor::decide(TimeNs t_ns) {
   }
   const bool usable = last_.running && last_.possible && seconds_between(life_.aided_ns, t_ns) < kUnaided &&
                       velocity_known() && !life_.contradicted;
-  const bool proven = !lost() || seconds_between(life_.doubtful_ns, t_ns) >= kProof;
+  const bool proven = !lost() || seconds_between(life_.unproven_ns, t_ns) >= kProof;
   const double sigma = std::max(health_.horizontal_sigma, health_.vertical_sigma);
   health_.imprecise = 2.0 * sigma > std::max(kPreciseEnough, kPrecise * life_.travelled);
   const bool sound = !health_.faulty.any() && !health_.imprecise;

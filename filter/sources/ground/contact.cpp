@@ -86,7 +86,7 @@ ContactEvent ContactDetector::add_laser(const LaserSample& sample) {
 
 /// On the ground every metre rolled is new ground: another normal, another height of the wheels over the plane.
 void ContactDetector::roll(const WheelWatch::Motion& motion) {
-  recent_way_ = recent_way_ * std::exp(-motion.dt / kJustNow) + motion.distance;
+  recent_distance_ = recent_distance_ * std::exp(-motion.dt / kJustNow) + motion.distance;
   if (mode_ != ContactMode::ground) return;
   ground_->move(motion.distance);
   const double renewals = motion.distance / (0.1 * kOtherGround) + motion.dt / kLevelTime;
@@ -98,7 +98,7 @@ void ContactDetector::roll(const WheelWatch::Motion& motion) {
 
 /// How far the wheels may seem to be above `level_` without being in the air.
 double ContactDetector::tolerance(bool all_agree) const {
-  const double unknown = all_agree ? std::min(1.0, recent_way_ / kOtherGround) : 1.0;
+  const double unknown = all_agree ? std::min(1.0, recent_distance_ / kOtherGround) : 1.0;
   return config_.takeoff_height + config_.unevenness * unknown;
 }
 
@@ -157,7 +157,7 @@ ContactEvent ContactDetector::change(ContactMode mode, TimeNs t_ns) {
   holds_since_ns_ = kNever;
   if (mode == ContactMode::ground) {
     level_ = std::clamp(ground_->height(), -config_.touchdown_height, config_.touchdown_height);
-    recent_way_ = kOtherGround;  // on new ground
+    recent_distance_ = kOtherGround;  // on new ground
   }
   if (first) return ContactEvent::none;
   return mode == ContactMode::ground ? ContactEvent::touchdown : ContactEvent::takeoff;

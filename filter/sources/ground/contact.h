@@ -73,8 +73,8 @@ class ContactDetector {
   TimeNs last_imu_ns_ = kNever;
   TimeNs falling_since_ns_ = kNever;
   TimeNs strike_ns_ = kNever;
-  double recent_way_ = 0.0;  ///< rolled just now [m]
-  double level_ = 0.0;       ///< height of standing wheels over the plane, which the ground's shape explains [m]
+  double recent_distance_ = 0.0;  ///< rolled just now [m]
+  double level_ = 0.0;            ///< height of standing wheels over the plane, which the ground's shape explains [m]
 };
 
 }  // namespace ear
