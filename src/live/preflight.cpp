@@ -179,7 +179,7 @@ void Preflight::judge_push(const Rest& from, const Rest& to) {
       text("by %.2f m ahead, say the cameras; wheels %.2f and %.2f times that", path_O.x(), left, right);
   const bool good = about_one(left) && about_one(right);
   if (left < 0.0 || right < 0.0)
-    words += ": a wheel counts backward, or `forward` has the wrong sign";
+    words += ": a wheel counts backward, or `forward` is wrong";
   else if (!good)
     words += ": radius, counts per turn or the cameras' scale is wrong";
   set(kPushName, good, words);
