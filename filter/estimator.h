@@ -1,4 +1,4 @@
-// What a front end, and whoever feeds samples, needs of an estimator: the filter, or another to compare it with.
+// What a front end, and whoever adds samples, needs of an estimator: the filter, or another to compare it with.
 #pragma once
 
 #include <Eigen/Core>

@@ -49,8 +49,7 @@ template <typename GoTo, typename OnContact>
 void take_encoder(const Intake& to, const EncoderSample& sample, const GoTo& go_to, const OnContact& on_contact) {
   const Ingest::Encoders taken = to.ingest.take(sample, to.ekf.time());
   if (!to.ingest.imu().empty()) to.health.add_encoder(taken.verdict, to.ingest.imu().newest().t_ns);
-  if (taken.verdict != Verdict::accepted) return;
-  if (!taken.increment) return;
+  if (taken.verdict != Verdict::accepted || !taken.increment) return;
   on_contact(to.sources.watch_contact(*taken.increment, to.ekf));
   to.sources.standstill().add(*taken.increment);
   if (const auto due_ns = to.ingest.due_before(*taken.increment, to.ekf.running())) go_to(*due_ns);

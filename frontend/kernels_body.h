@@ -1,10 +1,12 @@
 // The kernels themselves, without a name for the processor: each kernels_*.cpp says EAR_VARIANT and includes this.
-// Nothing here may instantiate or inline what other files share, or the linker could take an AVX2 version of it.
+// Nothing here may instantiate or inline what other files share, or the linker could take an AVX2 version of it: hence
+// plain arrays, and definitions that no other file includes.
 #pragma once
 
 #include "frontend/eight.h"
 #include "frontend/image_kernels.h"
 
+// NOLINTBEGIN(modernize-avoid-c-arrays,misc-definitions-in-headers): see above
 namespace ear::EAR_VARIANT {
 namespace {
 
@@ -434,3 +436,4 @@ void corner_scores(const std::uint8_t* row, std::ptrdiff_t stride, int width, st
 
 }  // namespace
 }  // namespace ear::EAR_VARIANT
+// NOLINTEND(modernize-avoid-c-arrays,misc-definitions-in-headers)

@@ -1,4 +1,4 @@
-// What class Odometry has to say for people: when its state of health changes, and what it does not use.
+// What class Odometry logs: when its state of health changes, and what it does not use.
 #pragma once
 
 #include <map>

@@ -78,7 +78,7 @@ std::optional<Eigen::Vector2d> match(const Pair& pair, const cv::Point& corner, 
   return Eigen::Vector2d(area.x + at.x + kHalfPatch, area.y + at.y + kHalfPatch);
 }
 
-/// Is what is at a corner seen in front of these cameras, and near enough to tell?
+/// Is what is at a corner seen in front of these cameras, and near enough to show the difference?
 bool is_in_front(const Pair& pair, const cv::Point& corner) {
   const auto left = pair.left_lens.to_normalized({corner.x, corner.y});
   const auto pixel = left ? match(pair, corner, *left) : std::nullopt;

@@ -5,7 +5,7 @@
 // the right one twice: as if the images were of the cameras that they are said to be of, and as if they were exchanged.
 // For two equal, parallel cameras the halves are the two sides of u_left: the disparity is d = u_left - u_right = f b
 // rho >= 0, and -d with the images exchanged, as if the point were behind the cameras. A match is right to a pixel, so
-// that one of more than 3 pixels from R x tells the halves apart, and what is farther than f b / 3 tells nothing.
+// that one of more than 3 pixels from R x distinguishes the halves, and what is farther than f b / 3 shows nothing.
 //
 // Wrong matches fall on both halves alike. If at most a fifth of the matches is on the wrong one, each match multiplies
 // the odds of the half that it is on by 0.8 / 0.2 = 4 at least; ten more on one than on the other make them 4^10, a
@@ -28,7 +28,7 @@ class SwappedCameras {
   void add(const ImageView& left, const ImageView& right);
 
   [[nodiscard]] Verdict verdict() const { return verdict_; }
-  /// Matches so far that tell: that fit the cameras as they are said to be, and exchanged.
+  /// Matches so far that show it: that fit the cameras as they are said to be, and exchanged.
   [[nodiscard]] int as_stated() const { return as_stated_; }
   [[nodiscard]] int exchanged() const { return exchanged_; }
 

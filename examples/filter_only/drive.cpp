@@ -32,7 +32,7 @@ constexpr ear::TimeNs kImuPeriod = 5'000'000;
 /// The vehicle at one time. Its world is the estimator's: it starts at the origin, along x.
 struct Truth {
   double speed = 0.0;         // [m/s]
-  double acceleration = 0.0;  // along the way [m/s^2]
+  double acceleration = 0.0;  // along the path [m/s^2]
   Eigen::Isometry3d T_WB = Eigen::Isometry3d::Identity();
 };
 

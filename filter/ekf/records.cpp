@@ -7,24 +7,18 @@ void InnovationLog::start_frame() {
 }
 
 void InnovationLog::add(Source source, const Innovation& innovation, TimeNs t_ns) {
-  SourceRecord& record = records_[index_of(source)];
-  record.innovation = innovation.value;
-  record.variance = innovation.variance;
-  record.gate_ratio = innovation.value * innovation.value / (innovation.gate * innovation.variance);
-  record.score = innovation.score;
-  ++(innovation.fits ? record.used : record.rejected);
-  if (innovation.fits) record.last_used_ns = t_ns;
+  add(source, innovation, innovation.fits ? 1 : 0, innovation.fits ? 0 : 1, t_ns);
 }
 
-void InnovationLog::add(Source source, const Features& features, TimeNs t_ns) {
+void InnovationLog::add(Source source, const Innovation& typical, int used, int rejected, TimeNs t_ns) {
   SourceRecord& record = records_[index_of(source)];
-  record.innovation = features.rms_px;
-  record.variance = features.variance_px2;
-  record.gate_ratio = features.rms_px * features.rms_px / (features.gate * features.variance_px2);
-  record.score = features.score;
-  record.used += features.used;
-  record.rejected += features.rejected;
-  if (features.used > 0) record.last_used_ns = t_ns;
+  record.innovation = typical.value;
+  record.variance = typical.variance;
+  record.gate_ratio = typical.value * typical.value / (typical.gate * typical.variance);
+  record.score = typical.score;
+  record.used += used;
+  record.rejected += rejected;
+  if (used > 0) record.last_used_ns = t_ns;
 }
 
 }  // namespace ear

@@ -27,17 +27,8 @@ class InnovationLog {
   void start_frame();
 
   void add(Source source, const Innovation& innovation, TimeNs t_ns);
-
-  /// The features of one camera.
-  struct Features {
-    int used = 0;
-    int rejected = 0;
-    double rms_px = 0.0;        ///< of all observations tested [px]
-    double variance_px2 = 0.0;  ///< expected [px^2]
-    double gate = 0.0;          ///< of the squared distance of one observation
-    double score = 1.0;         ///< SourceRecord::score
-  };
-  void add(Source source, const Features& features, TimeNs t_ns);
+  /// Many at once, of which so many fitted: the features of one camera. `typical`: the root of their mean square.
+  void add(Source source, const Innovation& typical, int used, int rejected, TimeNs t_ns);
 
   /// SourceRecord::score of a sensor that is no innovation's.
   void set_score(Source source, double score) { records_[index_of(source)].score = score; }

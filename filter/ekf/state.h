@@ -79,7 +79,7 @@ struct CameraState {
   double time_offset = 0.0;  ///< [s] add to a camera stamp to get IMU time
 };
 
-/// A camera's stamp by the clock of the IMU, and the other way round.
+/// A camera's stamp by the clock of the IMU, and the reverse.
 [[nodiscard]] TimeNs imu_time(TimeNs camera_time_ns, const CameraState& camera);
 [[nodiscard]] TimeNs camera_time(TimeNs imu_time_ns, const CameraState& camera);
 

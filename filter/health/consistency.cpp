@@ -8,9 +8,9 @@ namespace ear {
 namespace {
 
 constexpr int kDimensions = 3;
-constexpr std::size_t I = index_of(MotionSensor::imu);
-constexpr std::size_t O = index_of(MotionSensor::odometer);
-constexpr std::size_t C = index_of(MotionSensor::camera);
+constexpr std::size_t kImu = index_of(MotionSensor::imu);
+constexpr std::size_t kOdometer = index_of(MotionSensor::odometer);
+constexpr std::size_t kCamera = index_of(MotionSensor::camera);
 
 /// Distances between the displacements, each named by the sensor that it does not concern.
 using Distances = std::array<double, kMotionSensors>;
@@ -54,12 +54,12 @@ double chi_squared_of(const Displacements& displacements) {
 
 /// (15), before it is limited. Design note: what is printed gives each sensor a formula of its own.
 double weight_of(std::size_t sensor, const Distances& between_others, AnomalyWeight form) {
-  const double IO = between_others[C];
-  const double IC = between_others[O];
-  const double OC = between_others[I];
+  const double IO = between_others[kCamera];
+  const double IC = between_others[kOdometer];
+  const double OC = between_others[kImu];
   if (form == AnomalyWeight::printed) {
-    if (sensor == I) return 0.5 * (OC / IO + IC / IC);
-    if (sensor == O) return 0.5 * (IC / IO + IO / OC);
+    if (sensor == kImu) return 0.5 * (OC / IO + IC / IC);
+    if (sensor == kOdometer) return 0.5 * (IC / IO + IO / OC);
     return 0.5 * (OC / IC + IO / IC);
   }
   const double others = between_others[sensor];

@@ -5,7 +5,6 @@
 namespace ear {
 namespace {
 
-constexpr double kLongest = 0.25;   // [s] chosen: that one piece of evidence may count
 constexpr double kRounding = 1e-9;  // of sums that should be 1
 constexpr double kSilent = 0.12;    // [s] chosen: without a frame or reading,
 constexpr double kMissed = 2.5;     // chosen: and so many of its intervals
@@ -15,7 +14,7 @@ constexpr double kMissed = 2.5;     // chosen: and so many of its intervals
 double longest_silence(double interval) { return std::max(kSilent, kMissed * interval); }
 
 void FaultState::add(bool wrong, TimeNs t_ns) {
-  const double dt = last_ns_ ? std::clamp(seconds_between(*last_ns_, t_ns), 0.0, kLongest) : 0.0;
+  const double dt = last_ns_ ? std::clamp(seconds_between(*last_ns_, t_ns), 0.0, kFaultyAfter) : 0.0;
   last_ns_ = t_ns;
   if (wrong && !suspected_) onset_ns_ = t_ns;
   suspected_ = wrong || suspicion_ > 0.0;

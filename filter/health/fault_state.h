@@ -7,6 +7,11 @@
 
 namespace ear {
 
+/// Of what a sensor measured: more of it is wrong, and so is the sensor.
+inline constexpr double kMajority = 0.5;
+/// [s] chosen: what came before shows nothing of now.
+inline constexpr double kStale = 0.5;
+
 /// How long a source may be silent [s] that usually delivers every `interval` seconds; 0: not known.
 [[nodiscard]] double longest_silence(double interval);
 
@@ -16,7 +21,7 @@ class FaultState {
   static constexpr double kFaultyAfter = 0.25;  // [s] chosen: docs/health.md promises half a second
   static constexpr double kSoundAfter = 0.5;    // [s] chosen
 
-  /// What came since the last call: wrong or right. Long silence counts for a quarter of a second at most.
+  /// What came since the last call: wrong or right. Long silence counts for kFaultyAfter at most.
   void add(bool wrong, TimeNs t_ns);
   /// Something that never happens to a sound sensor.
   void report(TimeNs t_ns);

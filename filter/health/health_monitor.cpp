@@ -5,9 +5,6 @@
 namespace ear {
 namespace {
 
-constexpr double kMajority = 0.5;        // of the measurements of a wheel or beam
-constexpr int kFewTracks = 10;           // chosen
-constexpr double kStale = 0.5;           // [s] chosen: after which what the last frame showed holds no more
 constexpr double kTick = 0.03;           // [s] chosen: between two looks at silent sensors
 constexpr double kUnaided = 2.0;         // [s] chosen: that inertia alone may carry the estimate
 constexpr double kWorstVelocity = 1.0;   // [m/s] chosen: standard deviation of a velocity that is known,
@@ -182,7 +179,7 @@ bool HealthMonitor::wheels_carry(const FrameStatistics& frame) const {
 Aiding HealthMonitor::aiding_at(TimeNs t_ns) const {
   const FrameStatistics frame = seconds_between(last_.t_ns, t_ns) < kStale ? last_.statistics : FrameStatistics{};
   if (frame.standing) return Aiding::standing;
-  const bool cameras = images_.come(t_ns) && frame.tracks >= kFewTracks && images_.carry();
+  const bool cameras = images_.come(t_ns) && frame.tracks >= kFewFeatures && images_.carry();
   const bool wheels = wheels_carry(frame);
   if (cameras) return wheels ? Aiding::cameras_and_wheels : Aiding::cameras;
   return wheels ? Aiding::wheels : Aiding::none;
@@ -197,9 +194,9 @@ void HealthMonitor::decide(TimeNs t_ns) {
   if (health_.aiding != Aiding::none) life_.aided_ns = t_ns;
   const bool fresh = seconds_between(last_.t_ns, t_ns) < kStale;
   const bool off = fresh && images_.come(t_ns) &&
-                   ((last_.statistics.tracks >= kFewTracks && last_.agreement.contradicts()) || images_.misfit());
+                   ((last_.statistics.tracks >= kFewFeatures && last_.agreement.contradicts()) || images_.misfit());
   if (!off || (fresh && wheels_carry(last_.statistics))) life_.fitting_ns = t_ns;
-  if (off || health_.aiding == Aiding::none || !last_.running) life_.doubtful_ns = t_ns;
+  if (off || health_.aiding == Aiding::none || !last_.running) life_.unproven_ns = t_ns;
   life_.contradicted = last_.running && seconds_between(life_.fitting_ns, t_ns) > kContradicted;
 
   health_.faulty.reset();
@@ -211,7 +208,7 @@ void HealthMonitor::decide(TimeNs t_ns) {
   }
   const bool usable = last_.running && last_.possible && seconds_between(life_.aided_ns, t_ns) < kUnaided &&
                       velocity_known() && !life_.contradicted;
-  const bool proven = !lost() || seconds_between(life_.doubtful_ns, t_ns) >= kProof;
+  const bool proven = !lost() || seconds_between(life_.unproven_ns, t_ns) >= kProof;
   const double sigma = std::max(health_.horizontal_sigma, health_.vertical_sigma);
   health_.imprecise = 2.0 * sigma > std::max(kPreciseEnough, kPrecise * life_.travelled);
   const bool sound = !health_.faulty.any() && !health_.imprecise;

@@ -98,7 +98,7 @@ class HealthMonitor {
     bool any_frame = false;  ///< with an image or without
     TimeNs aided_ns = 0;
     TimeNs fitting_ns = 0;   ///< when something last did not contradict the state
-    TimeNs doubtful_ns = 0;  ///< while lost: when nothing carried the estimate, or the images contradicted it
+    TimeNs unproven_ns = 0;  ///< while lost: when nothing carried the estimate, or the images contradicted it
     bool contradicted = false;
     double travelled = 0.0;  ///< [m]
   };

@@ -6,17 +6,15 @@
 namespace ear {
 namespace {
 
-constexpr double kMajority = 0.5;       // of the stereo features behind the cameras: left and right exchanged
 constexpr double kSomeOff = 0.1;        // chosen: of the features off their place; a camera may be faulty
 constexpr double kNoisy = 1.5;          // chosen: times the usual noise of a feature: as little
 constexpr double kFewStereo = 0.25;     // chosen: of the features; less are seen by the right camera
-constexpr int kFewTracks = 10;          // chosen
 constexpr double kSparse = 0.4;         // chosen: of the usual number of features
 constexpr double kTracksMemory = 20.0;  // [s] chosen
 constexpr double kFitMemory = 1.0;      // [s] chosen
-constexpr double kSlowest = 0.5;        // [s] longer intervals are outages
 constexpr double kIntervalShare = 0.1;  // chosen: of each new interval in the usual one
 
+/// Left and right are exchanged: the stereo features seem to be behind the cameras.
 bool crossed(const FrameAgreement& seen) { return seen.behind > kMajority; }
 
 }  // namespace
@@ -30,7 +28,7 @@ bool ImageHealth::check(const FrameAgreement& seen, TimeNs t_ns, TimeNs newest_i
 
 void ImageHealth::add(const Image& image) {
   if (arrival_ns_) {
-    const double interval = std::min(seconds_between(last_ns_, image.t_ns), kSlowest);
+    const double interval = std::min(seconds_between(last_ns_, image.t_ns), kStale);
     interval_ += (interval_ == 0.0 ? 1.0 : kIntervalShare) * (interval - interval_);
   }
   last_ns_ = image.t_ns;
@@ -44,7 +42,7 @@ void ImageHealth::judge(const Image& image) {
   const FrameAgreement& seen = image.seen;
   const bool known = image.running && seen.matches > 0;
   const int tracks = image.statistics.tracks;
-  const bool blind = tracks < kFewTracks;
+  const bool blind = tracks < kFewFeatures;
   const bool poor = blind || tracks < kSparse * usual_tracks_ || seen.noise > kNoisy;
   const double share = std::max(interval_ / kTracksMemory, 1.0 / (1.0 + counted_));
   usual_tracks_ += share * (tracks - usual_tracks_);
@@ -73,7 +71,7 @@ void ImageHealth::report(TimeNs t_ns) {
   carrying_.report(t_ns);
 }
 
-bool ImageHealth::misfit() const { return rejected_ > used_ && used_ + rejected_ >= kFewTracks; }
+bool ImageHealth::misfit() const { return rejected_ > used_ && used_ + rejected_ >= kFewFeatures; }
 
 bool ImageHealth::come(TimeNs t_ns) const {
   return cameras_ > 0 && arrival_ns_ && seconds_between(*arrival_ns_, t_ns) < longest_silence(interval_);

@@ -3,10 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "filter/ingest/stream_clock.h"
+
 namespace ear {
 namespace {
 
-constexpr int kStampsToKnow = 20;        // chosen: until the usual difference is known
 constexpr double kLongestDelay = 0.1;    // [s] chosen: that may be usual
 constexpr double kStampOff = 0.06;       // [s] chosen: off the usual
 constexpr double kStampSpreads = 6.0;    // chosen: mean deviations
@@ -19,7 +20,7 @@ bool StampWatch::add(TimeNs stamp_ns, TimeNs imu_ns) {
   if (count_ == 0) usual_ = std::clamp(ahead, -kLongestDelay, kLongestDelay);  // the first one may be false
   const double off = std::abs(ahead - usual_);
   const double share = std::max(1.0 / kStampMemory, 1.0 / (count_ + 1));
-  const bool unusual = count_ >= kStampsToKnow && off > std::max(kStampOff, kStampSpreads * spread_);
+  const bool unusual = count_ >= kToKnow && off > std::max(kStampOff, kStampSpreads * spread_);
   const double counted = std::min(off, kStampOff);  // what is usual changes slowly
   usual_ += share * std::clamp(ahead - usual_, -counted, counted);
   spread_ += share * (counted - spread_);

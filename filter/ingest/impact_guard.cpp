@@ -6,10 +6,8 @@
 namespace ear {
 namespace {
 
-constexpr double kSpread = 4.0;        // deviations from the mean, in standard deviations, are ordinary
 constexpr double kAccelShare = 0.1;    // of a deviation: bandwidth, scale and timing make that much of it wrong
 constexpr double kGyroShare = 1.0;     // no body turns so suddenly: as much as a limit that is not known yet may hide
-constexpr double kLongest = 0.06;      // [s] a longer deviation is no strike, but how the vehicle moves
 constexpr double kFull = 0.98;         // of the range or more is clipped
 constexpr double kFlat = 1e-6;         // relative: two extreme values as equal as this were cut off
 constexpr double kGyroMemory = 0.05;   // [s] bodies turn fast, but not suddenly
@@ -25,27 +23,25 @@ double ExcessWatch::add(const Eigen::Vector3d& value, double dt) {
   }
   const Eigen::Vector3d deviation = value - mean_;
   const double distance = deviation.norm();
-  const double ordinary = std::max(least_, kSpread * std::sqrt(variance_));
+  const double ordinary = std::max(least_, kOrdinary * std::sqrt(variance_));
   const bool cut_off = clips_ = clipped(value);
   last_ = value;
 
   const bool strikes = distance > ordinary;
   lasts_ = strikes || cut_off ? lasts_ + 1 : 0;
-  lasting_ = lasts_ > 1 ? lasting_ + dt : 0.0;
-  const bool strike = strikes && lasting_ < kLongest;
 
   // What is out of the ordinary counts as if it were at its limit: one strike does not move the mean, and a lasting
   // change becomes the new mean. Nor do strikes, however many, make strikes ordinary: that takes what lies between.
   const double counted = std::min(distance, ordinary);
   const double share = 1.0 - std::exp(-dt / memory_);
   if (distance > 0.0) mean_ += share * counted / distance * deviation;
-  if (!strike) variance_ += (1.0 - std::exp(-dt / (kSpreadMemory * memory_))) * (counted * counted - variance_);
+  if (!strikes) variance_ += (1.0 - std::exp(-dt / (kSpreadMemory * memory_))) * (counted * counted - variance_);
 
   // The errors of one strike have one sign. White noise adds up as they do if the k-th sample has 2 k - 1 times the
   // variance: n samples then have n^2 times that of one.
   const double coherent = std::sqrt(std::max(0.0, 2.0 * lasts_ - 1.0));
   if (cut_off) return coherent * std::max(distance, least_);
-  return strike ? coherent * error_share_ * distance : 0.0;
+  return strikes ? coherent * error_share_ * distance : 0.0;
 }
 
 /// At the end of a known range; or, where it is not known, at the level of a flat top: the same extreme value twice.

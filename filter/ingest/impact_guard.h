@@ -12,6 +12,9 @@
 
 namespace ear {
 
+/// Standard deviations of what an inertial sensor does: less is ordinary.
+inline constexpr double kOrdinary = 4.0;
+
 /// Watches one sensor of three axes.
 class ExcessWatch {
  public:
@@ -35,7 +38,6 @@ class ExcessWatch {
   Eigen::Vector3d mean_ = Eigen::Vector3d::Zero();
   double variance_ = 0.0;  ///< of the distance from the mean
   int lasts_ = 0;          ///< samples in a row out of the ordinary
-  double lasting_ = 0.0;   ///< from the first of them to now [s]
   bool clips_ = false;
 };
 

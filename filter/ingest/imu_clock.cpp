@@ -9,14 +9,11 @@
 namespace ear {
 namespace {
 
-constexpr std::size_t kCapacity = 512;
-constexpr std::size_t kMostWaiting = 256;  // samples: 0.25 s at 1 kHz
-constexpr double kLongestWait = 0.25;      // [s]
-constexpr double kShare = 0.5;             // of the jump: readings that are off by less did not jump
-constexpr int kVotes = 2;                  // readings, for a verdict
-constexpr std::size_t kFewest = 3;         // samples after the jump: one false stamp is none
-constexpr double kReview = 5.0;            // [s] in which a verdict may be undone
-constexpr double kMemory = 100.0;          // samples, readings
+constexpr std::size_t kCapacity = 512;  // samples, twice as many as may wait: 0.25 s at 1 kHz
+constexpr double kLongestWait = 0.25;   // [s]
+constexpr int kVotes = 2;               // readings, for a verdict
+constexpr std::size_t kFewest = 3;      // samples after the jump: one false stamp is none
+constexpr double kReview = 5.0;         // [s] in which a verdict may be undone
 
 }  // namespace
 
@@ -30,7 +27,7 @@ bool ImuClock::others_show(double step) const {
   for (const Other& other : others_) {
     if (!other.before_ns) continue;
     any = true;
-    if (step > 0.0 && seconds_between(*other.before_ns, *other.newest_ns) > kShare * step) return false;
+    if (step > 0.0 && seconds_between(*other.before_ns, *other.newest_ns) > kJumpShare * step) return false;
   }
   return any;
 }
@@ -39,7 +36,7 @@ void ImuClock::follow(TimeNs driver_ns) {
   if (last_ns_) {
     const double step = seconds_between(*last_ns_, driver_ns);
     if (interval_ == 0.0 && step > 0.0) interval_ = std::min(step, kClockJump);
-    if (std::abs(step - interval_) <= kClockJump) interval_ += (step - interval_) / kMemory;
+    if (std::abs(step - interval_) <= kClockJump) interval_ += (step - interval_) / kClockMemory;
   }
   last_ns_ = driver_ns;
   for (Other& other : others_) other.before_ns = other.newest_ns;
@@ -56,7 +53,7 @@ void ImuClock::add(const ImuSample& sample) {
     const double step = seconds_between(newest_waiting(), sample.t_ns);
     const bool follows = step > 0.0 && !jumps(step);
     const bool long_enough =
-        samples_.size() >= kMostWaiting || static_cast<double>(samples_.size()) * interval_ > kLongestWait;
+        samples_.size() >= kCapacity / 2 || static_cast<double>(samples_.size()) * interval_ > kLongestWait;
     if (!follows || long_enough) settle(false);
   } else if (last_ns_) {
     const double step = seconds_between(*last_ns_, sample.t_ns);
@@ -76,7 +73,7 @@ void ImuClock::observe(Stream stream, TimeNs stamp_ns) {
   if (waiting_ && other.before_ns) {
     const double passed = static_cast<double>(samples_.size()) * interval_;
     const double measured = seconds_between(*other.before_ns, stamp_ns);
-    votes_ += std::abs(measured - passed) < kShare * std::abs(jump_) ? 1 : -1;
+    votes_ += std::abs(measured - passed) < kJumpShare * std::abs(jump_) ? 1 : -1;
     const bool enough = samples_.size() >= kFewest || votes_ < 0;
     if (std::abs(votes_) >= kVotes && enough) settle(votes_ > 0);
   }
@@ -108,11 +105,11 @@ void ImuClock::settle(bool own_clock) {
 void ImuClock::review(Other& other, TimeNs stamp_ns) {
   const double ahead = seconds_between(*last_ns_ - shift_ns_, stamp_ns);
   if (!corrected_ns_) {
-    other.ahead += (other.newest_ns ? 1.0 / kMemory : 1.0) * (ahead - other.ahead);
+    other.ahead += (other.newest_ns ? 1.0 / kClockMemory : 1.0) * (ahead - other.ahead);
     return;
   }
   const double jumped = (ahead - other.ahead) / jump_;
-  contradictions_ = jumped > kShare && jumped < 1.0 + kShare ? contradictions_ + 1 : 0;
+  contradictions_ = jumped > kJumpShare && jumped < 1.0 + kJumpShare ? contradictions_ + 1 : 0;
   if (contradictions_ < kContradictions) return;
   shift_ns_ -= std::llround(1e9 * jump_);
   corrected_ns_.reset();

@@ -3,11 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "filter/ingest/impact_guard.h"
+
 namespace ear {
 namespace {
 
 constexpr double kTurnRate = 100.0;    // [rad/s^2] chosen: of a multirotor of 1.5 kg, 15 N on one side at 0.15 m
-constexpr double kSpread = 4.0;        // chosen: steps beyond so many standard deviations of the recent ones are jumps
 constexpr double kSpreadMemory = 0.2;  // [s] chosen
 constexpr double kReturned = 0.25;     // chosen: of the deviation, between the samples before and after a spike
 constexpr double kFlat = 0.125;  // chosen: of it, between the samples of one; half a sine over three differs by 0.4
@@ -19,7 +20,7 @@ bool SpikeWatch::add(ImuBuffer& samples, double dt, bool no_strike, bool clips) 
   const Eigen::Vector3d before = samples.entry(length_ + 1).sample.*value_;
   const double step = (value - (length_ > 0 ? measured_[length_ - 1] : before)).norm();
   const bool may_be_strike = strikes_ && !no_strike;
-  const double spread = kSpread * std::sqrt(step_variance_);
+  const double spread = kOrdinary * std::sqrt(step_variance_);
   const double limit = std::max(strikes_ && no_strike ? 0.0 : std::max(least_, least_rate_ * dt), spread);
   const double counted = std::min(step, limit);
   step_variance_ += (1.0 - std::exp(-dt / kSpreadMemory)) * (counted * counted - step_variance_);

@@ -8,10 +8,7 @@
 namespace ear {
 namespace {
 
-constexpr int kToKnow = 20;        // readings until it is known how they usually come
-constexpr double kMemory = 100.0;  // readings
-constexpr double kShare = 0.5;     // of a jump, that its two measures may differ by
-constexpr double kPause = 5.0;     // intervals; after longer ones steps show nothing
+constexpr double kPause = 5.0;  // intervals; after longer ones steps show nothing
 
 }  // namespace
 
@@ -22,13 +19,13 @@ double StreamClock::jump_at(TimeNs t_ns, TimeNs now_ns, double tick) const {
   const double intervals = std::max(1.0, std::round(passed / interval_));
   const double jump = seconds_between(*last_ns_, t_ns) - intervals * interval_;
   const double ahead = seconds_between(now_ns, t_ns) - ahead_;
-  return is_clock_jump(jump) && std::abs(jump) > tick && std::abs(ahead - jump) < kShare * std::abs(jump) ? jump : 0.0;
+  return is_clock_jump(jump) && std::abs(jump) > tick && std::abs(ahead - jump) < kJumpShare * std::abs(jump) ? jump : 0.0;
 }
 
 void StreamClock::follow(TimeNs t_ns, std::optional<TimeNs> now_ns) {
   if (now_ns && last_ns_ && last_now_ns_) {
     const double step = seconds_between(*last_ns_, t_ns);
-    const double share = std::max(1.0 / kMemory, 1.0 / (count_ + 1));
+    const double share = std::max(1.0 / kClockMemory, 1.0 / (count_ + 1));
     if (step > 0.0 && (count_ < kToKnow || std::abs(step - interval_) < kClockJump))
       interval_ += share * (step - interval_);
     ahead_ += share * (seconds_between(*now_ns, t_ns) - ahead_);
@@ -44,7 +41,7 @@ void StreamClock::follow(TimeNs t_ns, std::optional<TimeNs> now_ns) {
 bool StreamClock::shift_was_wrong(TimeNs stamp_ns, TimeNs now_ns) {
   const double own = seconds_between(now_ns, stamp_ns) - ahead_;
   const double shifted = own - 1e-9 * static_cast<double>(shift_ns_);
-  const bool against = shift_ns_ != 0 && is_clock_jump(shifted) && std::abs(own) < kShare * std::abs(shifted);
+  const bool against = shift_ns_ != 0 && is_clock_jump(shifted) && std::abs(own) < kJumpShare * std::abs(shifted);
   contradictions_ = against ? contradictions_ + 1 : 0;
   return contradictions_ >= kContradictions;
 }

@@ -70,7 +70,7 @@ class EncoderReader {
  public:
   explicit EncoderReader(const EncoderCalibration& calibration) : calibration_(calibration) {}
 
-  /// The increment since the reading before; nothing for the first. A difference is taken the short way round: wheels
+  /// The increment since the reading before; nothing for the first. A difference is taken as the shorter turn: wheels
   /// must not turn by more than half a revolution between readings.
   [[nodiscard]] std::optional<WheelIncrement> add(const EncoderSample& sample);
 

@@ -37,6 +37,7 @@ struct StereoTable {
   const bool* has_right1;
   int count;
 };
+// NOLINTBEGIN(modernize-avoid-c-arrays): the kernels use no functions of std::array, see kernels_body.h
 /// R (by rows) and p: what takes points elsewhere.
 struct PlainPose {
   double R[9], p[3];
@@ -53,6 +54,7 @@ struct StereoProblem {
 struct StereoSums {
   double A[21], b[6];
 };
+// NOLINTEND(modernize-avoid-c-arrays)
 
 struct FilterKernels {
   Kernels kind;

@@ -15,6 +15,7 @@
 #include <arm_neon.h>
 #endif
 
+// NOLINTBEGIN(modernize-avoid-c-arrays): the kernels use no functions of std::array, see kernels_body.h
 namespace ear::EAR_VARIANT {
 
 using Two = double __attribute__((vector_size(16)));
@@ -101,3 +102,4 @@ inline Four load(const double* p) {
 inline void store(double* p, const Four& numbers) { std::memcpy(p, &numbers, sizeof(numbers)); }
 
 }  // namespace ear::EAR_VARIANT
+// NOLINTEND(modernize-avoid-c-arrays)

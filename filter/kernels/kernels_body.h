@@ -1,10 +1,12 @@
 // The kernels themselves, without a name for the processor: each kernels_*.cpp says EAR_VARIANT and includes this.
-// Nothing here may instantiate or inline what other files share, or the linker could take an AVX2 version of it.
+// Nothing here may instantiate or inline what other files share, or the linker could take an AVX2 version of it: hence
+// plain arrays, and definitions that no other file includes.
 #pragma once
 
 #include "filter/kernels/filter_kernels.h"
 #include "filter/kernels/four.h"
 
+// NOLINTBEGIN(modernize-avoid-c-arrays,misc-definitions-in-headers): see above
 namespace ear::EAR_VARIANT {
 namespace {
 
@@ -21,7 +23,7 @@ constexpr int whole(int rows) { return (rows + 7) / 8 * 8; }
 template <int i>
 struct Index {
   static constexpr int value = i;
-  constexpr operator int() const { return i; }
+  constexpr operator int() const { return i; }  // NOLINT(google-explicit-constructor): it stands for its number
 };
 
 // f(0), f(1), ... f(n - 1), written out: sums then stay in registers.
@@ -437,3 +439,4 @@ inline FilterKernels kernels(Kernels kind) {
 }
 
 }  // namespace ear::EAR_VARIANT
+// NOLINTEND(modernize-avoid-c-arrays,misc-definitions-in-headers)

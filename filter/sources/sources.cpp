@@ -20,7 +20,6 @@ constexpr double kShakenAccel = 0.02;  // [m/s^2] chosen: docs/decisions/0025
 
 Sources::Sources(const FilterConfig& config, const Calibration& calibration)
     : imu_(calibration.imu),
-      normal_walk_(0.0),
       imu_score_(config.odometer.scores),
       ground_(config, calibration),
       cameras_(config, calibration),

@@ -69,7 +69,7 @@ class Sources {
   void hold(Ekf& ekf, Records& records);
 
   ImuCalibration imu_;
-  double normal_walk_;  ///< [rad/sqrt(m)]; 0 without wheels
+  double normal_walk_ = 0.0;  ///< [rad/sqrt(m)]; 0 without wheels
   ImuScore imu_score_;
   ImuMotion motion_;  ///< from the state to the frame at hand
   std::optional<Wheels> wheels_;

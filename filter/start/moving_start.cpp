@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "filter/ekf/propagation.h"
 #include "filter/ekf/so3.h"
 #include "filter/ekf/turn_between.h"
 #include "filter/start/known_gravity.h"
@@ -10,7 +11,6 @@
 namespace ear {
 namespace {
 
-constexpr double kSpan = 1.5;  // [s] of frames that it takes
 constexpr std::size_t kFewestFrames = 8;
 constexpr double kLongestStep = 0.35;    // [s] between two frames
 constexpr double kScaleSigma = 0.02;     // of a path: noise of the disparities makes points too near or too far
@@ -49,14 +49,6 @@ bool frozen(const std::vector<StereoMatch>& matches) {
   return std::all_of(matches.begin(), matches.end(), [](const StereoMatch& m) { return m.left0 == m.left1; });
 }
 
-Eigen::Matrix3d rotation_between(const ImuBuffer& imu, TimeNs from_ns, TimeNs to_ns) {
-  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
-  imu.for_each_piece(from_ns, to_ns, [&](const Eigen::Vector3d& gyro_B, const Eigen::Vector3d&, double dt) {
-    R = R * exp_so3(gyro_B * dt);
-  });
-  return R;
-}
-
 }  // namespace
 
 void MovingStart::add(TimeNs t_ns, const FeatureFrame& frame, const ImuBuffer& imu, const CameraState& cameras) {
@@ -67,7 +59,7 @@ void MovingStart::add(TimeNs t_ns, const FeatureFrame& frame, const ImuBuffer& i
     const TimedFrame& last = frames_.back();
     const std::vector<StereoMatch>& matches = matches_.find(last.features, frame);
     StereoMotion start;
-    start.R_B0B1 = rotation_between(imu, last.t_ns, t_ns);
+    start.R_B0B1 = gyro_rotation(last.t_ns, t_ns, Eigen::Vector3d::Zero(), imu);
     const double dt = seconds_between(last.t_ns, t_ns);
     start.p_B0B1 = path_to(t_ns).value_or(Eigen::Vector3d::Zero());
     const std::optional<StereoMotion> motion = stereo_motion(matches, cameras, start, noise_.feature);
@@ -79,7 +71,7 @@ void MovingStart::add(TimeNs t_ns, const FeatureFrame& frame, const ImuBuffer& i
   }
   frames_.push_back(std::move(next));
   const auto enough_without_first = [&] {
-    return frames_.size() > kFewestFrames && seconds_between(frames_[1].t_ns, t_ns) >= kSpan;
+    return frames_.size() > kFewestFrames && seconds_between(frames_[1].t_ns, t_ns) >= kStartSpan;
   };
   while (enough_without_first()) frames_.erase(frames_.begin());
 }
@@ -97,7 +89,7 @@ Eigen::Vector3d MovingStart::gyro_bias(const ImuBuffer& imu) const {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (std::size_t k = 1; k < frames_.size(); ++k) {
     const double dt = seconds_between(frames_[k - 1].t_ns, frames_[k].t_ns);
-    const Eigen::Matrix3d R = rotation_between(imu, frames_[k - 1].t_ns, frames_[k].t_ns);
+    const Eigen::Matrix3d R = gyro_rotation(frames_[k - 1].t_ns, frames_[k].t_ns, Eigen::Vector3d::Zero(), imu);
     const double information = dt * dt / (kRotationSigma * kRotationSigma);
     sum -= information / dt * log_so3(R.transpose() * frames_[k].motion.R_B0B1);
     weight += information;
@@ -106,7 +98,7 @@ Eigen::Vector3d MovingStart::gyro_bias(const ImuBuffer& imu) const {
 }
 
 bool MovingStart::spans_enough() const {
-  return frames_.size() >= kFewestFrames && seconds_between(frames_.front().t_ns, frames_.back().t_ns) >= kSpan;
+  return frames_.size() >= kFewestFrames && seconds_between(frames_.front().t_ns, frames_.back().t_ns) >= kStartSpan;
 }
 
 std::optional<ImuState> MovingStart::solve(const ImuBuffer& imu) const {

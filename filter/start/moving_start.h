@@ -12,6 +12,9 @@
 
 namespace ear {
 
+/// [s] chosen: of what a start in motion takes.
+inline constexpr double kStartSpan = 1.5;
+
 /// Standard deviations of what is not known before, and of one observation.
 struct MovingStartNoise {
   double gyro_bias = 0.1;    ///< [rad/s]

@@ -13,7 +13,6 @@
 namespace ear {
 namespace {
 
-constexpr double kRollingStart = 1.5;        // [s] chosen: of increments that a rolling start takes
 constexpr double kMovingVelocity = 0.5;      // [m/s] and share of the speed: before the samples of the window are used
 constexpr double kGravityTolerance = 1.5;    // [m/s^2] chosen: of the specific force at rest; more is a wrong unit
 constexpr double kStartGravityNoise = 0.02;  // [m/s^2] what idling rotors leave in the mean specific force
@@ -74,7 +73,7 @@ std::optional<StartState> Start::find(const Situation& now, const ImuStatistics&
   if (!start && now.rolls) {
     const RollingStartNoise noise{config_.prior.gyro_bias, config_.prior.accel_bias, calibration_.encoder->stamp_sigma};
     const OdometerState odometer = odometer_state(calibration_);
-    lacks = lacking_for_rolling_start(ingest.imu(), ingest.waiting_increments(), now.t_ns, kRollingStart);
+    lacks = lacking_for_rolling_start(ingest.imu(), ingest.waiting_increments(), now.t_ns, kStartSpan);
     const std::optional<ImuState> x = lacks == Reason::none
                                           ? rolling_start(ingest.imu(), ingest.waiting_increments(), odometer, noise)
                                           : std::nullopt;

@@ -85,7 +85,7 @@ struct ContactConfig {
   double touchdown_height = 0.025;  ///< [m] wheels below it, neither rising nor falling, stand on the ground
   double touchdown_duration = 0.2;  ///< [s] for which the beams must show it
   double touchdown_climb = 0.06;    ///< [m/s] neither rising nor falling
-  double confirmed_height = 0.05;   ///< [m] below it a strike, or wheels that are spun up, is a touchdown at once
+  double confirmed_height = 0.05;   ///< [m] below it a strike is a touchdown at once
   double strike = 10.0;             ///< [m/s^2] change of the specific force's magnitude
 };
 

@@ -24,7 +24,7 @@ py::object add_frame(GuardedOdometry& self, const RecordedFrame& frame) {
   return to_python(self.work([&](CalibratedOdometry& e) { return e.odometry.add_stereo(frame); }));
 }
 
-/// As `ear run` does it; between frames Ctrl-C is heard.
+/// As `ear run` does it; between frames it looks for Ctrl-C.
 py::list replay(GuardedRecording& recording, GuardedOdometry& odometry, const py::object& on_frame) {
   std::vector<Estimate> estimates;
   const auto take = [&](const tools::ReplayedFrame& frame) {

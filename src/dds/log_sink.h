@@ -1,4 +1,4 @@
-// What Cyclone DDS has to say, which else goes to standard error.
+// The messages of Cyclone DDS, which else goes to standard error.
 #pragma once
 
 #include <functional>

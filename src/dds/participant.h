@@ -84,7 +84,7 @@ struct Received {
 };
 
 /// Reads topics on a thread of its own. Each reader asks for what its publishers offer, reliable or best-effort, so
-/// that either kind is heard, also after one was replaced by the other.
+/// that either kind is received, also after one was replaced by the other.
 class Subscription {
  public:
   Subscription(const Participant& participant, std::vector<Wanted> wanted, std::function<void(const Received&)> take);

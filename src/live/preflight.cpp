@@ -102,7 +102,7 @@ void Preflight::add(const EncoderSample& sample) {
   if (!first_count_) first_count_ = sample;
   const auto rolled = [&](std::int64_t from, std::int64_t to, double radius) {
     std::int64_t counts = to - from;
-    if (encoder.wraps) {  // the shorter way round
+    if (encoder.wraps) {  // the shorter turn
       counts %= encoder.resolution;
       if (2 * counts > encoder.resolution) counts -= encoder.resolution;
       if (2 * counts < -encoder.resolution) counts += encoder.resolution;
@@ -170,15 +170,16 @@ void Preflight::judge_lift(const Rest& from, const Rest& to) {
 void Preflight::judge_push(const Rest& from, const Rest& to) {
   const Eigen::Isometry3d& T_BO = calibration_.encoder->T_BO;
   const Eigen::Matrix3d R_from = from.state->q_WB.toRotationMatrix(), R_to = to.state->q_WB.toRotationMatrix();
-  const Eigen::Vector3d way =
+  const Eigen::Vector3d path =
       (to.state->p_WB + R_to * T_BO.translation()) - (from.state->p_WB + R_from * T_BO.translation());
-  const Eigen::Vector3d way_O = T_BO.linear().transpose() * R_from.transpose() * way;
-  if (std::abs(way_O.x()) < kPush || Eigen::AngleAxisd(R_rest_).angle() > kStraight) return;
-  const double left = (to.wheel[0] - from.wheel[0]) / way_O.x(), right = (to.wheel[1] - from.wheel[1]) / way_O.x();
-  std::string words = text("by %.2f m ahead, say the cameras; wheels %.2f and %.2f times that", way_O.x(), left, right);
+  const Eigen::Vector3d path_O = T_BO.linear().transpose() * R_from.transpose() * path;
+  if (std::abs(path_O.x()) < kPush || Eigen::AngleAxisd(R_rest_).angle() > kStraight) return;
+  const double left = (to.wheel[0] - from.wheel[0]) / path_O.x(), right = (to.wheel[1] - from.wheel[1]) / path_O.x();
+  std::string words =
+      text("by %.2f m ahead, say the cameras; wheels %.2f and %.2f times that", path_O.x(), left, right);
   const bool good = about_one(left) && about_one(right);
   if (left < 0.0 || right < 0.0)
-    words += ": a wheel counts backward, or `forward` is the wrong way";
+    words += ": a wheel counts backward, or `forward` is wrong";
   else if (!good)
     words += ": radius, counts per turn or the cameras' scale is wrong";
   set(kPushName, good, words);

@@ -91,8 +91,8 @@ class RosNode::Impl {
   void show(const Odometry& odometry) {
     if (publisher_) publisher_->show(odometry);
   }
-  void tell(TimeNs t_ns, const std::string& rates) {
-    if (publisher_) publisher_->tell(t_ns, rates);
+  void publish_status(TimeNs t_ns, const std::string& rates) {
+    if (publisher_) publisher_->publish_status(t_ns, rates);
   }
   std::vector<std::string> look() {
     std::vector<std::string> words = sensors_ ? sensors_->look() : std::vector<std::string>{};
@@ -134,7 +134,7 @@ void RosNode::take(const LiveFrame& frame) { impl_->send(frame); }
 void RosNode::show(const Odometry& odometry) { impl_->show(odometry); }
 void RosNode::take(const StereoFrame& frame) { impl_->send(frame); }
 std::vector<std::string> RosNode::look() { return impl_->look(); }
-void RosNode::tell(TimeNs t_ns, const std::string& rates) { impl_->tell(t_ns, rates); }
+void RosNode::publish_status(TimeNs t_ns, const std::string& rates) { impl_->publish_status(t_ns, rates); }
 
 std::string missing_ros_parts() { return ""; }
 

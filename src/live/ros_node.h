@@ -45,9 +45,9 @@ class RosNode {
   void show(const Odometry& odometry);
   /// By the cameras' thread.
   void take(const StereoFrame& frame);
-  /// By the main thread: what changed, in words; and once a second, what subscribers are told.
+  /// By the main thread: what changed, in words; and once a second, the status for subscribers.
   [[nodiscard]] std::vector<std::string> look();
-  void tell(TimeNs t_ns, const std::string& rates);
+  void publish_status(TimeNs t_ns, const std::string& rates);
 
  private:
   class Impl;

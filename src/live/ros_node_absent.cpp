@@ -22,7 +22,7 @@ void RosNode::take(const LiveFrame& /*frame*/) {}
 void RosNode::show(const Odometry& /*odometry*/) {}
 void RosNode::take(const StereoFrame& /*frame*/) {}
 std::vector<std::string> RosNode::look() { return {}; }
-void RosNode::tell(TimeNs /*t_ns*/, const std::string& /*rates*/) {}
+void RosNode::publish_status(TimeNs /*t_ns*/, const std::string& /*rates*/) {}
 
 std::string missing_ros_parts() {
   return "topics of ROS 2 are not built in: install libfastcdr-dev and cyclonedds-dev, and build again";

@@ -78,7 +78,7 @@ void RosPublisher::take(const LiveFrame& frame) {
   if (path != nullptr) write(*path_writer_, messages_.names().path, state.t_ns, *path);
 }
 
-void RosPublisher::tell(TimeNs t_ns, const std::string& rates) {
+void RosPublisher::publish_status(TimeNs t_ns, const std::string& rates) {
   Health health;
   {
     const std::lock_guard lock(mutex_);

@@ -38,7 +38,7 @@ class RosPublisher {
   void take(const LiveSample& sample) { gyro_B_ = sample.imu.gyro_B; }
   void take(const LiveFrame& frame);
   /// By the main thread, once a second.
-  void tell(TimeNs t_ns, const std::string& rates);
+  void publish_status(TimeNs t_ns, const std::string& rates);
 
  private:
   template <typename Message>

@@ -11,7 +11,7 @@ std::int64_t resolution_of(const Calibration& calibration) {
   return calibration.encoder.value_or(EncoderCalibration{}).resolution;
 }
 
-void say(const Warnings& warnings, Complaints& complaints) {
+void report(const Warnings& warnings, Complaints& complaints) {
   for (const Warning& warning : warnings.list()) complaints.add(warning.kind + ": " + warning.first);
 }
 
@@ -63,7 +63,7 @@ void RosSensors::take_imu(const dds::Received& message) {
     Warnings warnings;
     imu_.take(raw(message), samples, warnings);
     for (const ImuSample& sample : samples) intake_.add(sample);
-    say(warnings, complaints_);
+    report(warnings, complaints_);
   });
 }
 
@@ -87,7 +87,7 @@ void RosSensors::take_image(const dds::Received& message) {
     ros2::GreyImage image = ros2::grey_image(raw(message), camera == 0 ? "cam0" : "cam1", warnings);
     if (!image.pixels.empty()) pairing_.take(camera, std::move(image), frames, warnings);
     for (const RecordedFrame& frame : frames) intake_.add(static_cast<const StereoFrame&>(frame));
-    say(warnings, complaints_);
+    report(warnings, complaints_);
   });
 }
 

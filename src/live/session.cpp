@@ -78,7 +78,7 @@ Session::Session(const SessionOptions& options, const LiveSettings& settings, co
 
 std::string Session::run(const std::function<std::optional<std::string>()>& wait, Notifier& notifier) {
   const TimeNs begin = clock_.now();
-  last_told_.alive_ns = begin;
+  last_reported_.alive_ns = begin;
   notifier.ready();
   log_info("ready");
   while (true) {
@@ -87,8 +87,8 @@ std::string Session::run(const std::function<std::optional<std::string>()>& wait
     const TimeNs now = clock_.now();
     if (preflight_ && all_right()) return "the check is done";
     if (options_.duration > 0.0 && seconds_between(begin, now) >= options_.duration) return "the time is over";
-    say();
-    tell(notifier, now);
+    log_news();
+    report_status(notifier, now);
   }
 }
 
@@ -97,7 +97,7 @@ void Session::stop() {
   if (ros_ != nullptr) ros_->stop();
   cameras_.reset();
   estimator_.stop();
-  say();
+  log_news();
   log_info(report_.summary() + "; " + overflow_text(estimator_.overflows()) + "; " +
            std::to_string(estimator_.impatient()) + " frames did not wait for late readings");
 }
@@ -155,14 +155,14 @@ IntakeTaps Session::taps() {
           }};
 }
 
-/// Tells of one sample those who ask for all of a kind.
+/// Passes one sample to those who ask for all of a kind.
 template <typename What>
 void Session::note(const What& what) {
   if (recorder_) recorder_->add(what);
   if (preflight_) preflight_->add(what);
 }
 
-void Session::say() {
+void Session::log_news() {
   if (preflight_) {
     for (const PreflightItem& item : preflight_->news()) log_info("check: " + words_of(item));
   }
@@ -178,17 +178,17 @@ void Session::say() {
   for (const std::string& words : ros_->look()) log_warning(words);
 }
 
-/// The watchdog is fed while the estimator takes samples, or there are none.
-void Session::tell(Notifier& notifier, TimeNs now) {
+/// The watchdog is reset while the estimator takes samples, or there are none.
+void Session::report_status(Notifier& notifier, TimeNs now) {
   const std::uint64_t samples = report_.samples();
   const std::string rates = intake_.rates();
-  if (samples != last_told_.samples || rates.rfind("imu silent", 0) == 0) last_told_.alive_ns = now;
-  last_told_.samples = samples;
-  if (notifier.watchdog() && seconds_between(last_told_.alive_ns, now) < kStuck) notifier.alive();
-  if (seconds_between(last_told_.status_ns, now) < kStatusInterval) return;
-  last_told_.status_ns = now;
+  if (samples != last_reported_.samples || rates.rfind("imu silent", 0) == 0) last_reported_.alive_ns = now;
+  last_reported_.samples = samples;
+  if (notifier.watchdog() && seconds_between(last_reported_.alive_ns, now) < kStuck) notifier.alive();
+  if (seconds_between(last_reported_.status_ns, now) < kStatusInterval) return;
+  last_reported_.status_ns = now;
   notifier.status(report_.health() + "; " + rates);
-  if (ros_ != nullptr) ros_->tell(now, rates);
+  if (ros_ != nullptr) ros_->publish_status(now, rates);
   log(LogLevel::debug, report_.health() + "; " + rates);
 }
 

@@ -61,8 +61,8 @@ class Session {
   template <typename What>
   void note(const What& what);
   [[nodiscard]] bool all_right() const;
-  void say();
-  void tell(Notifier& notifier, TimeNs now);
+  void log_news();
+  void report_status(Notifier& notifier, TimeNs now);
 
   /// What systemd was told of.
   struct LastTold {
@@ -85,7 +85,7 @@ class Session {
   Intake intake_;
   std::unique_ptr<MavlinkLines> lines_;
   std::unique_ptr<StereoCamera> cameras_;
-  LastTold last_told_;
+  LastTold last_reported_;
 };
 
 }  // namespace ear::live

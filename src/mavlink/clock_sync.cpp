@@ -6,7 +6,7 @@
 namespace ear::mavlink {
 namespace {
 
-constexpr double kLongest = 0.1;       // [s] a round trip that tells nothing
+constexpr double kLongest = 0.1;       // [s] a round trip that shows nothing
 constexpr double kUsual = 2.0;         // times the quickest round trip: such exchanges count
 constexpr double kUsualMargin = 1e-3;  // [s] and so much more
 constexpr double kForget = 1.01;       // the quickest round trip grows by this with each exchange

@@ -24,7 +24,7 @@ struct LinkCounts {
   std::uint64_t dropped = 0;       ///< messages that the line did not take, or that nothing was there to receive
 };
 
-/// What else a link does with what it hears; called by its thread.
+/// What else a link does with what it receives; called by its thread.
 struct LinkListener {
   std::function<void(const Packet&)> on_packet;  ///< each packet that came, after answers to it were sent
   bool asks_time = false;                        ///< sends a TIMESYNC request ten times a second

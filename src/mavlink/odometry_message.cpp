@@ -7,7 +7,7 @@
 namespace ear::mavlink {
 namespace {
 
-/// Between x forward, y left, z up and x forward, y right, z down, both ways: half a turn about x.
+/// Between x forward, y left, z up and x forward, y right, z down, and the reverse: half a turn about x.
 Eigen::Matrix3d half_turn() { return Eigen::Vector3d(1.0, -1.0, -1.0).asDiagonal(); }
 
 /// d(position, rotation) / d(estimate's error).

@@ -1,4 +1,5 @@
-// When did the vehicle of a recording stand? An IMU alone cannot tell: at constant speed it is as quiet as at rest.
+// When did the vehicle of a recording stand? An IMU alone does not show it: at constant speed it is as quiet as at
+// rest.
 #pragma once
 
 #include <cstdint>

@@ -27,7 +27,7 @@ struct SensorTopics {
   std::string tf_static = "/tf_static";  ///< tf2_msgs/TFMessage
   std::string base_frame = "base_link";  ///< REP-105: the vehicle's frame in tf, x forward, z up
   std::string truth = "/truth";          ///< geometry_msgs/PoseStamped; written, not read
-  std::filesystem::path calibration;     ///< folder with <sensor>/sensor.yaml, which override what topics say
+  std::filesystem::path calibration;     ///< folder with <sensor>/sensor.yaml, which override the topics
 
   [[nodiscard]] bool imu_apart() const { return imu.empty() && !gyro.empty() && !accel.empty(); }
   /// Beams that have a topic.

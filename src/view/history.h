@@ -24,7 +24,7 @@ struct Entry {
   Text image, right;         ///< JPEG of the left and of the right camera; null where there is none
 };
 
-/// The whole way in a bounded number of points: when there are too many, every second one is left out from then on.
+/// The whole path in a bounded number of points: when there are too many, every second one is left out from then on.
 class Path {
  public:
   static constexpr std::size_t kMostPoints = 4000;

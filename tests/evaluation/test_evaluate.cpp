@@ -103,10 +103,10 @@ TEST_CASE("evaluate: stretches longer than the drive, or across a gap, do not co
   CHECK(result.relative[1].stretches == 21);
 
   poses.erase(poses.begin() + 30, poses.begin() + 60);  // 3 m without an estimate
-  const Evaluation holed = evaluate(estimate_of(poses), drive(7.0, 50.0), AlignmentKind::none);
-  CHECK(holed.relative[0].distance == 1.0);
-  CHECK(holed.relative[0].stretches == 21);
-  CHECK(holed.coverage == doctest::Approx(3.9 / 7.0));
+  const Evaluation with_gaps = evaluate(estimate_of(poses), drive(7.0, 50.0), AlignmentKind::none);
+  CHECK(with_gaps.relative[0].distance == 1.0);
+  CHECK(with_gaps.relative[0].stretches == 21);
+  CHECK(with_gaps.coverage == doctest::Approx(3.9 / 7.0));
 }
 
 TEST_CASE("length: neither noise nor the rate of the truth add to it") {

@@ -87,7 +87,7 @@ TEST_CASE("report: stands alone, names everything, escapes what it is given") {
   CHECK(count(page, "class=\"band") == 12);  // three axes of position and of rotation, two estimates
 }
 
-TEST_CASE("report: who is at fault and how far each sensor is trusted, of the estimates that say it") {
+TEST_CASE("report: who is at fault and the weight of each sensor, of the estimates that have it") {
   const Trajectory truth = walk(30.0, 50.0);
   std::vector<ReportEntry> entries{entry("with", truth, 10.0, 30.0), entry("without", truth, 10.0, 20.0)};
   const std::size_t poses = entries[0].estimate.poses.size();

@@ -106,7 +106,7 @@ TEST_CASE("bias_watch: what another source misled does not count") {
   CHECK(watch.judge(changes_by(correction, Vector6::Constant(1e-4)), 3 * kStep).any());
 }
 
-TEST_CASE("bias_watch: small jumps widen the covariance, and accuse nobody") {
+TEST_CASE("bias_watch: small jumps widen the covariance, and report no fault") {
   BiasWatch watch;
   Vector6 correction = Vector6::Zero();
   correction << 1e-3, 0.0, 0.0, 0.0, 0.05, 0.0;

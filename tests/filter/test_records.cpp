@@ -42,7 +42,7 @@ TEST_CASE("records: what is no number does not fit") {
 TEST_CASE("records: a new frame counts from zero, and remembers what was measured last") {
   InnovationLog log;
   log.add(Source::beam_2, innovation(0.01), 100);
-  log.add(Source::camera_left, InnovationLog::Features{30, 2, 0.5, 0.36, kGate}, 110);
+  log.add(Source::camera_left, {0.5, 0.36, kGate}, 30, 2, 110);
   log.start_frame();
   const SourceRecord& beam = log.records()[index_of(Source::beam_2)];
   CHECK(beam.used == 0);

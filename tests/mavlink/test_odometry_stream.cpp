@@ -177,7 +177,7 @@ TEST_CASE("mavlink stream: the variance of the angular rate is the noise of one 
   CHECK(message->velocity_covariance(5, 5) == doctest::Approx(1.0 + 4e-6 * 400.0));
 }
 
-TEST_CASE("mavlink stream: every state of health has a text that fits, and names who is not trusted") {
+TEST_CASE("mavlink stream: every state of health has a text that fits, and names the sensors at fault") {
   for (const LinkHealth health : {LinkHealth::starting, LinkHealth::good, LinkHealth::weak, LinkHealth::lost}) {
     for (unsigned long sources = 0; sources < 1UL << kSourceCount; ++sources) {
       CHECK_FALSE(to_text(health, sources).text.empty());

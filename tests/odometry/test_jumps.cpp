@@ -64,7 +64,7 @@ TEST_CASE("jumps: on the ground they cost little, are announced, and nothing is 
         "clock_jump.encoder", "camera_late", "imu_spikes"}) {
     expect_cheap("flat1", fault, clean, 2.0);
   }
-  // 0.2 m/s^2 of the accelerometer are found piece by piece, and no piece is large enough to accuse it.
+  // 0.2 m/s^2 of the accelerometer are found piece by piece, and no piece is large enough for a fault.
   const Outcome accel = run("flat1", "imu_bias_jump.accel");
   CHECK(accel.ate < 2.5 * clean);
   CHECK(accel.lost == 0.0);

@@ -29,7 +29,7 @@ simulator::Simulation simulate(const char* sequence, std::uint64_t seed, double 
   return simulator::Simulation(options);
 }
 
-/// Which of the simulated sensors a vehicle has, and since when it hears of them.
+/// Which of the simulated sensors a vehicle has, and since when it gets their samples.
 struct Vehicle {
   double from = 0.0;  ///< [s] after the first frame
   std::size_t cameras = 2;

@@ -164,7 +164,7 @@ std::string strips(const Trajectory& truth, const std::vector<ReportEntry>& entr
   return out;
 }
 
-/// The trust in each sensor over time, of the estimates that say it.
+/// The weight of each sensor over time, of the estimates that have it.
 std::string weight_panels(const Trajectory& truth, const std::vector<ReportEntry>& entries, const Range& time) {
   const std::vector<std::pair<std::string, double SensorWeights::*>> sensors{
       {"weight: IMU", &SensorWeights::imu}, {"odometer", &SensorWeights::odometer}, {"camera", &SensorWeights::camera}};
@@ -306,7 +306,7 @@ std::string position_section(const Trajectory& truth, const std::vector<ReportEn
       "Position error",
       "True minus estimated in the axes of the estimate's world, first poses aligned. Shaded: three standard "
       "deviations, as the estimate gives them. Below, where the estimate says it: what the vehicle does, its health, "
-      "the sensor at fault, and the weight of each sensor (1: trusted; 0: it told nothing).",
+      "the sensor at fault, and the weight of each sensor (1: full; 0: it measured nothing).",
       "t [s]", stacked(plots, "time [s]") + strips(truth, entries, time) + weight_panels(truth, entries, time));
 }
 

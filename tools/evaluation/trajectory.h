@@ -52,7 +52,7 @@ struct TerrainEstimate {
   Slope sigma;                 ///< standard deviations of the slope
 };
 
-/// Trust in each of the sensors that tell of motion: 1 full, 0 it told nothing.
+/// Weight of each of the sensors that measure motion: 1 full, 0 it measured nothing.
 struct SensorWeights {
   double imu = 1.0;
   double odometer = 1.0;

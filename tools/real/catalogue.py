@@ -53,7 +53,7 @@ HELD = {
                         "3 s of images in 145 s of inertial samples: hence the coverage. It moves 2 cm: no per cent, and no error "
                         "can be beyond 0.1 m"),
     "euroc_v101_mono": Held("V1_01 in motion, one camera", "euroc",
-                            "a single camera in motion tells no scale: no estimate is the right answer"),
+                            "a single camera in motion shows no scale: no estimate is the right answer"),
     "euroc_mh01_mono": Held("MH_01 reversed in time: stands 4 s, then flies 5 m; one camera", "euroc",
                             "the errors are millimetres, where those of the truth count in NEES"),
     "kitti_a": Held("a car, stereo 10 Hz, starts at 7 m/s", "kitti_raw",

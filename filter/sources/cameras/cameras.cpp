@@ -16,10 +16,9 @@ constexpr int kBridgeRows = 6;
 constexpr double kApparent = 3.0;  // standard deviations of the cameras' calibration that look like a turn
 constexpr double kLooser = 4.0;    // a wrong distance must not look like a turn: it may be wrong by more than it should
 constexpr double kOldImage = 0.5;  // [s] chosen: after which frames have little in common
-constexpr double kComparedStep = 1e-4;    // [rad, m] chosen: a tenth of what two images show
-constexpr double kRecent = 0.3;           // [s] chosen: an image shows the motion for so long
-constexpr std::size_t kFewFeatures = 10;  // chosen: fewer show too little of the motion, as for health
-constexpr double kNoisy = 1.25;           // chosen: times the usual noise of a feature; less may be chance
+constexpr double kComparedStep = 1e-4;  // [rad, m] chosen: a tenth of what two images show
+constexpr double kRecent = 0.3;         // [s] chosen: an image shows the motion for so long
+constexpr double kNoisy = 1.25;         // chosen: times the usual noise of a feature; less may be chance
 
 }  // namespace
 

@@ -144,9 +144,9 @@ bool FeatureInformation::add(const std::vector<LinearizedObservation>& observati
   W.setZero();
   for (std::size_t i = 0; i < observations.size(); ++i) {
     const LinearizedObservation& z = observations[i];
-    const Eigen::Matrix<double, 2, 3> wH_f = weights_[i] * z.H_f;
-    W.topRows<kCalibration>().noalias() += z.H_calibration.transpose().lazyProduct(wH_f);
-    W.middleRows<err::clone_size>(clone_column(z.clone)).noalias() += z.H_clone.transpose().lazyProduct(wH_f);
+    const Eigen::Matrix<double, 2, 3> weighted_H_f = weights_[i] * z.H_f;
+    W.topRows<kCalibration>().noalias() += z.H_calibration.transpose().lazyProduct(weighted_H_f);
+    W.middleRows<err::clone_size>(clone_column(z.clone)).noalias() += z.H_clone.transpose().lazyProduct(weighted_H_f);
   }
   kernels_.solve({V_llt.matrixLLT().data(), 3}, size_, 3, {W.data(), W.outerStride()});
 

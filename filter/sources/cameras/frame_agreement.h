@@ -5,6 +5,9 @@
 
 namespace ear {
 
+/// Chosen: fewer features show too little of where the vehicle is.
+inline constexpr int kFewFeatures = 10;
+
 struct FrameAgreement {
   int matches = 0;             ///< features seen by both cameras in the first frame, by the left one in the second
   double left = 0.0;           ///< share of them that are not where they were expected: left camera

@@ -4,11 +4,12 @@
 #include <cmath>
 #include <vector>
 
+#include "filter/sources/cameras/triangulation.h"
+
 namespace ear {
 namespace {
 
-constexpr std::size_t kFewest = 8;    // features in common, for any result
-constexpr double kLeastDepth = 1e-3;  // of a scaled point: smaller is beside or behind the camera
+constexpr std::size_t kFewest = 8;  // features in common, for any result
 
 /// Standard deviation of an inverse depth by stereo [1/m]. `sigma`: of one observation, normalized.
 double inverse_depth_sigma(double sigma, const CameraState& cameras) {

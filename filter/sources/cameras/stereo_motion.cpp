@@ -9,15 +9,15 @@
 #include "filter/ekf/so3.h"
 #include "filter/ingest/capacity.h"
 #include "filter/kernels/filter_kernels.h"
+#include "filter/sources/cameras/triangulation.h"
 
 namespace ear {
 namespace {
 
 constexpr int kIterations = 12;
-constexpr double kLeastShare = 0.6;   // of the features that fit
-constexpr double kHuber = 2.0;        // [standard deviations] from where an observation weighs less
-constexpr double kFits = 3.5;         // [standard deviations] of an observation that does
-constexpr double kLeastDepth = 1e-3;  // of a scaled point: smaller is beside or behind the camera
+constexpr double kLeastShare = 0.6;  // of the features that fit
+constexpr double kHuber = 2.0;       // [standard deviations] from where an observation weighs less
+constexpr double kFits = 3.5;        // [standard deviations] of an observation that does
 
 /// Sums of one Gauss-Newton step over (rotation, translation).
 struct NormalEquations {

@@ -115,14 +115,13 @@ void TrackUpdate::log(const Ekf& ekf, Records& records) const {
   for (std::size_t camera = 0; camera < camera_count_; ++camera) {
     const Residuals& seen = residuals_[camera];
     if (seen.count == 0) continue;
-    InnovationLog::Features features;
-    features.used = records.statistics.features_used;
-    features.rejected = records.statistics.features_rejected;
-    features.rms_px = std::sqrt(seen.squares_px2 / seen.count);
-    features.variance_px2 = config_.feature_sigma_px * config_.feature_sigma_px;
-    features.gate = ekf.gate().quantile(1);
-    features.score = 1.0 / ekf.state().clones.back().feature_noise;
-    records.log.add(camera == 0 ? Source::camera_left : Source::camera_right, features, ekf.state().imu.t_ns);
+    Innovation typical;  // [px]
+    typical.value = std::sqrt(seen.squares_px2 / seen.count);
+    typical.variance = config_.feature_sigma_px * config_.feature_sigma_px;
+    typical.gate = ekf.gate().quantile(1);
+    typical.score = 1.0 / ekf.state().clones.back().feature_noise;
+    records.log.add(camera == 0 ? Source::camera_left : Source::camera_right, typical, records.statistics.features_used,
+                    records.statistics.features_rejected, ekf.state().imu.t_ns);
   }
 }
 

@@ -7,7 +7,6 @@ namespace ear {
 namespace {
 
 constexpr int kMaxIterations = 8;
-constexpr double kMinDepthCosine = 1e-3;         // of a scaled point: smaller is beside or behind the camera
 constexpr double kSettled = 1e-10;               // squared step, in bearings and relative depth
 constexpr double kNegativeInverseDepth = -0.02;  // noise makes far points come out slightly beyond infinity [1/m]
 
@@ -50,7 +49,7 @@ std::optional<InverseDepthPoint> triangulate(const std::vector<Sighting>& sighti
       J_h.leftCols<2>() = R_CA.leftCols<2>();
       J_h.col(2) = s.R_CW * (point.p_WA - s.p_WC);
       const Eigen::Vector3d h = R_CA * point.bearing_A + point.inverse_depth * J_h.col(2);
-      if (h.z() < kMinDepthCosine) return std::nullopt;
+      if (h.z() < kLeastDepth) return std::nullopt;
       const double w = 1.0 / h.z();
       const Eigen::Vector2d predicted = h.head<2>() * w;
       const Eigen::Matrix<double, 2, 3> J = w * (J_h.topRows<2>() - predicted * J_h.row(2));

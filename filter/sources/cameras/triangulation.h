@@ -9,6 +9,9 @@
 
 namespace ear {
 
+/// Of a scaled point: smaller is beside or behind the camera.
+inline constexpr double kLeastDepth = 1e-3;
+
 /// One ray: a camera's pose and what it saw, normalized.
 struct Sighting {
   Eigen::Matrix3d R_CW;

@@ -3,13 +3,13 @@
 #include <algorithm>
 
 #include "filter/ingest/capacity.h"
+#include "filter/sources/cameras/frame_agreement.h"
 #include "filter/sources/cameras/parallax.h"
 
 namespace ear {
 namespace {
 
 constexpr int kLeastWindow = 3;          // clones: one pair with parallax and the newest
-constexpr int kEnoughFeatures = 10;      // chosen: used, they show enough of where the vehicle is
 constexpr double kWithoutUpdates = 0.6;  // [s] measured, docs/decisions: the state may do without for so long
 
 }  // namespace
@@ -26,7 +26,7 @@ void WindowRule::set_size(int clones) {
 
 void WindowRule::add_updates(int features, TimeNs t_ns) {
   features_ += features;
-  if (features_ < kEnoughFeatures) return;
+  if (features_ < kFewFeatures) return;
   features_ = 0;
   updated_ns_ = t_ns;
 }

@@ -6,17 +6,13 @@
 namespace ear {
 namespace {
 
-constexpr double kGravity = 9.81;       // [m/s^2]
-constexpr double kFreeFall = 3.0;       // [m/s^2] less specific force than this, and nothing carries the vehicle
-constexpr double kFallDuration = 0.04;  // [s]
-constexpr double kConfirmation = 0.1;   // [s] for which a strike or driven wheels confirm
-constexpr double kJustNow = 0.3;        // [s] the distance rolled in this time counts for the tolerance
-constexpr double kFullWay = 0.2;        // [m] of it, and the ground may be as uneven as it gets
-constexpr double kLevelSigma = 0.02;    // [m] of the wheels' height over the plane, on the ground
-constexpr double kLevelWay = 0.2;   // [m] over which this height changes; the sight of it is renewed ten times as often
-constexpr double kLevelTime = 2.0;  // [s] the same for a vehicle at rest
-constexpr double kLongestStep = 0.1;    // [s] between inertial samples
-constexpr double kAirSpeed = 1.0;       // [m/s] at which the ground passes below a flying vehicle
+constexpr double kConfirmation = 0.1;  // [s] for which a strike confirms
+constexpr double kJustNow = 0.3;       // [s] the distance rolled in this time counts for the tolerance
+constexpr double kOtherGround = 0.2;   // [m] over which the ground becomes another
+constexpr double kLevelSigma = 0.02;   // [m] of the wheels' height over the plane; the beams see it ten times meanwhile
+constexpr double kLevelTime = 2.0;     // [s] the same for a vehicle at rest
+constexpr double kLongestStep = 0.1;   // [s] between inertial samples
+constexpr double kAirSpeed = 1.0;      // [m/s] at which the ground passes below a flying vehicle
 constexpr double kFirstDuration = 0.1;  // [s] of evidence for the first mode
 constexpr double kSilence = 0.3;        // [s] without a reading that agrees, and the beams show nothing
 constexpr double kHeightKnown = 0.05;   // [m]
@@ -31,7 +27,7 @@ ContactDetector::ContactDetector(const ContactConfig& config, const Calibration&
   }
   y_B_ = calibration.encoder->T_BO.linear().col(1);
   ground_.emplace(*calibration.lasers, *calibration.encoder);
-  wheels_.emplace(*calibration.encoder);
+  wheel_radius_ = {calibration.encoder->wheel_radius[0], calibration.encoder->wheel_radius[1]};
 }
 
 std::optional<TimeNs> ContactDetector::since_ns() const {
@@ -47,16 +43,10 @@ ContactEvent ContactDetector::add_imu(const ImuSample& sample) {
 
   const Eigen::Vector3d angle_B = dt * (sample.gyro_B - b_g_);
   ground_->turn(angle_B, sample.accel_B, dt);
-  wheels_->turn_body(angle_B.dot(y_B_));
+  body_angle_ += angle_B.dot(y_B_);
   if (mode_ != ContactMode::ground) ground_->move(kAirSpeed * dt);
 
-  const double force = sample.accel_B.norm();
-  if (force > kFreeFall) {
-    falling_since_ns_ = kNever;
-  } else if (falling_since_ns_ == kNever) {
-    falling_since_ns_ = sample.t_ns;
-  }
-  if (std::abs(force - kGravity) > config_.strike) {
+  if (std::abs(sample.accel_B.norm() + kGravity_W.z()) > config_.strike) {
     strike_ns_ = sample.t_ns;
     ground_->strike();
   }
@@ -65,9 +55,7 @@ ContactEvent ContactDetector::add_imu(const ImuSample& sample) {
 
 ContactEvent ContactDetector::add_wheels(const WheelIncrement& increment) {
   if (!ground_) return ContactEvent::none;
-  const WheelWatch::Motion motion = wheels_->add(increment);
-  if (motion.driven) driven_ns_ = increment.to_ns;
-  roll(motion);
+  roll(increment);
   return look_for_confirmed_touchdown(increment.to_ns);
 }
 
@@ -86,21 +74,26 @@ ContactEvent ContactDetector::add_laser(const LaserSample& sample) {
   return ContactEvent::none;
 }
 
-/// On the ground every metre rolled is new ground: another normal, another height of the wheels over the plane.
-void ContactDetector::roll(const WheelWatch::Motion& motion) {
-  recent_way_ = recent_way_ * std::exp(-motion.dt / kJustNow) + motion.distance;
+/// On the ground every metre rolled is new ground: another normal, another height of the wheels over the plane. The
+/// faster wheel counts, backwards too; what the body turned about the axle is part of the reading.
+void ContactDetector::roll(const WheelIncrement& increment) {
+  const double dt = increment.duration();
+  const double distance =
+      wheel_radius_.cwiseProduct((increment.angle.array() + body_angle_).matrix()).cwiseAbs().maxCoeff();
+  body_angle_ = 0.0;
+  recent_distance_ = recent_distance_ * std::exp(-dt / kJustNow) + distance;
   if (mode_ != ContactMode::ground) return;
-  ground_->move(motion.distance);
-  const double renewals = motion.distance / (0.1 * kLevelWay) + motion.dt / kLevelTime;
+  ground_->move(distance);
+  const double renewals = distance / (0.1 * kOtherGround) + dt / kLevelTime;
   ground_->suppose_height(level_, kLevelSigma / std::sqrt(renewals));
-  const double share = 1.0 - std::exp(-motion.distance / kLevelWay - motion.dt / kLevelTime);
+  const double share = 1.0 - std::exp(-distance / kOtherGround - dt / kLevelTime);
   const double level = level_ + share * (ground_->height() - level_);
   level_ = std::clamp(level, -config_.touchdown_height, config_.touchdown_height);
 }
 
 /// How far the wheels may seem to be above `level_` without being in the air.
 double ContactDetector::tolerance(bool all_agree) const {
-  const double unknown = all_agree ? std::min(1.0, recent_way_ / kFullWay) : 1.0;
+  const double unknown = all_agree ? std::min(1.0, recent_distance_ / kOtherGround) : 1.0;
   return config_.takeoff_height + config_.unevenness * unknown;
 }
 
@@ -116,8 +109,7 @@ ContactEvent ContactDetector::look_for_takeoff(const GroundTracker::Sighting& si
   const bool airborne = sighting.agreeing >= std::min(2, ground_->beams()) &&
                         lowest > level_ + tolerance(sighting.agreeing == ground_->beams()) &&
                         sighting.lowest_lift > level_ + 0.5 * config_.takeoff_height;
-  const bool falling = falling_since_ns_ != kNever && seconds_between(falling_since_ns_, t_ns) > kFallDuration;
-  if (!lasts(airborne, t_ns, falling ? 0.0 : config_.takeoff_duration)) return ContactEvent::none;
+  if (!lasts(airborne, t_ns, config_.takeoff_duration)) return ContactEvent::none;
   return change(ContactMode::air, t_ns);
 }
 
@@ -129,18 +121,13 @@ ContactEvent ContactDetector::look_for_touchdown(TimeNs t_ns) {
   return look_for_confirmed_touchdown(t_ns);
 }
 
-/// Something struck the vehicle, or drives its wheels, while it is low. Where the beams show nothing it takes both.
+/// Something struck the vehicle while it is low, as beams show that measure, and not before it left the ground.
 ContactEvent ContactDetector::look_for_confirmed_touchdown(TimeNs t_ns) {
   if (mode_ != ContactMode::air) return ContactEvent::none;
-  const auto just_now = [&](TimeNs what_ns) {  // and not before the vehicle left the ground
-    return what_ns > since_ns_ && seconds_between(what_ns, t_ns) < kConfirmation;
-  };
-  const bool struck = just_now(strike_ns_);
-  const bool driven = just_now(driven_ns_);
+  const bool struck = strike_ns_ > since_ns_ && seconds_between(strike_ns_, t_ns) < kConfirmation;
   const bool silent = seconds_between(seen_ns_, t_ns) > kSilence;
   const bool low = ground_->height_sigma() < kHeightKnown && ground_->height() < config_.confirmed_height;
-  if (silent ? struck && driven : low && (struck || driven)) return change(ContactMode::ground, t_ns);
-  return ContactEvent::none;
+  return struck && low && !silent ? change(ContactMode::ground, t_ns) : ContactEvent::none;
 }
 
 bool ContactDetector::lasts(bool holds, TimeNs t_ns, double duration) {
@@ -159,7 +146,7 @@ ContactEvent ContactDetector::change(ContactMode mode, TimeNs t_ns) {
   holds_since_ns_ = kNever;
   if (mode == ContactMode::ground) {
     level_ = std::clamp(ground_->height(), -config_.touchdown_height, config_.touchdown_height);
-    recent_way_ = kFullWay;  // on new ground
+    recent_distance_ = kOtherGround;  // on new ground
   }
   if (first) return ContactEvent::none;
   return mode == ContactMode::ground ? ContactEvent::touchdown : ContactEvent::takeoff;

@@ -1,5 +1,5 @@
 // Does the vehicle stand or roll on the ground, or does it fly? The beams decide: contact is when the plane they hit
-// passes the wheel radius below the axle. A strike or wheels that are spun up from below only make the decision faster.
+// passes the wheel radius below the axle. A strike only makes the decision faster.
 // docs/filter.md, "Contact".
 #pragma once
 
@@ -12,8 +12,9 @@
 #include "ear/calibration.h"
 #include "ear/filter_config.h"
 #include "ear/types.h"
+#include "filter/ekf/state.h"
+#include "filter/ingest/wheel_increment.h"
 #include "filter/sources/ground/ground_tracker.h"
-#include "filter/sources/ground/wheel_watch.h"
 
 namespace ear {
 
@@ -56,24 +57,23 @@ class ContactDetector {
   ContactEvent look_for_confirmed_touchdown(TimeNs t_ns);
   [[nodiscard]] bool lasts(bool holds, TimeNs t_ns, double duration);
   [[nodiscard]] double tolerance(bool all_agree) const;
-  void roll(const WheelWatch::Motion& motion);
+  void roll(const WheelIncrement& increment);
 
   ContactConfig config_;
-  Eigen::Vector3d y_B_ = Eigen::Vector3d::UnitY();  ///< along the axle, to the left
-  std::optional<GroundTracker> ground_;             ///< none without wheels or lasers
-  std::optional<WheelWatch> wheels_;
+  Eigen::Vector3d y_B_ = Eigen::Vector3d::UnitY();          ///< along the axle, to the left
+  std::optional<GroundTracker> ground_;                     ///< none without wheels or lasers
+  Eigen::Vector2d wheel_radius_ = Eigen::Vector2d::Zero();  ///< left, right [m]
   Eigen::Vector3d b_g_ = Eigen::Vector3d::Zero();
 
   ContactMode mode_ = ContactMode::unknown;
   TimeNs since_ns_ = kNever;
   TimeNs holds_since_ns_ = kNever;  ///< first reading in a row that speaks for a change
   TimeNs seen_ns_ = kNever;         ///< last reading that agreed with the plane tracked
-  TimeNs driven_ns_ = kNever;       ///< when something last made the wheels turn faster
   TimeNs last_imu_ns_ = kNever;
-  TimeNs falling_since_ns_ = kNever;
   TimeNs strike_ns_ = kNever;
-  double recent_way_ = 0.0;  ///< rolled just now [m]
-  double level_ = 0.0;       ///< height of standing wheels over the plane, which the ground's shape explains [m]
+  double body_angle_ = 0.0;       ///< about the axle since the last increment [rad], nose-down positive
+  double recent_distance_ = 0.0;  ///< rolled just now [m]
+  double level_ = 0.0;            ///< height of standing wheels over the plane, which the ground's shape explains [m]
 };
 
 }  // namespace ear

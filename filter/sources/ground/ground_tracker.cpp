@@ -18,10 +18,9 @@ constexpr double kSteepest = 0.8;        // [rad] ground that is tilted more is 
 constexpr double kUpTime = 3.0;          // [s] over which the specific force is against gravity in the mean
 constexpr double kNormalDrift = 0.02;    // [rad/sqrt(s)] what is left of the gyroscope's errors
 constexpr double kClimbWalk = 0.3;       // [m/s/sqrt(s)]
-constexpr double kStrikeClimb = 1.0;     // [m/s] change of the rate of climb by a strike
 constexpr double kUnknownNormal = 0.25;  // [rad] of the body's tilt against the ground
 constexpr double kUnknownHeight = 4.0;   // [m]
-constexpr double kUnknownClimb = 1.0;    // [m/s]
+constexpr double kUnknownClimb = 1.0;    // [m/s] at first, and what a strike changes
 constexpr double kGate = 4.0;            // standard deviations
 constexpr double kReturnGate = 2.0;      // the same for a beam that disagreed before
 constexpr double kReturnTime = 0.07;     // [s] chosen: of agreement, until it is used again
@@ -61,7 +60,7 @@ void GroundTracker::move(double distance) {
   for (int axis = 0; axis < 3; ++axis) update(Vector::Unit(axis), up_B_(axis) - x_(axis), variance);
 }
 
-void GroundTracker::strike() { P_(kClimb, kClimb) += kStrikeClimb * kStrikeClimb; }
+void GroundTracker::strike() { P_(kClimb, kClimb) += kUnknownClimb * kUnknownClimb; }
 
 void GroundTracker::suppose_height(double level, double sigma) {
   const Vector H = Vector::Unit(kHeight);
