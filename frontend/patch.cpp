@@ -49,6 +49,13 @@ Photometry photometry_of(const AlignmentSums& sums, float energy) {
   return p;
 }
 
+// Of a step that takes `decrease` off the sum of squared differences (patch less image, in units of the patch).
+float chi2_of(float decrease, const Photometry& before, float energy, int parameters) {
+  const float difference = energy * (1.0F / (before.correlation * before.correlation) - 1.0F);
+  const float noise = (difference - decrease) / static_cast<float>(kPatchPixels - parameters - 2);  // gain and offset
+  return noise > 0.0F ? decrease / noise : std::numeric_limits<float>::infinity();
+}
+
 Eigen::Vector3f vector_of(const Moments& m) { return {m.one, m.x, m.y}; }
 
 Eigen::Matrix3f matrix_of(const Moments& m) {
@@ -130,10 +137,11 @@ std::optional<PatchLevel::Step> PatchLevel::step_position(const ImageKernels& ke
   const Photometry p = photometry_of(sums, energy_);
   if (!(p.gain > kMinGain)) return std::nullopt;
   const Eigen::Vector2f residual =
-      Eigen::Vector2f(sums.x, sums.y) - p.mean * J_sum_.head<2>() - p.gain * J_value_.head<2>();
-  const Eigen::Vector2f moved = warp.affine * (covariance_position_ * residual) * (-scale / p.gain);
+      (Eigen::Vector2f(sums.x, sums.y) - p.mean * J_sum_.head<2>() - p.gain * J_value_.head<2>()) / p.gain;
+  const Eigen::Vector2f step = covariance_position_ * residual;
+  const Eigen::Vector2f moved = warp.affine * step * -scale;
   warp.centre += moved;
-  return Step{p.correlation, moved};
+  return Step{p.correlation, moved, chi2_of(step.dot(residual), p, energy_, 2)};
 }
 
 std::optional<PatchLevel::Step> PatchLevel::step_affine(const ImageKernels& kernels, const GreyLevel& level,
@@ -153,7 +161,9 @@ std::optional<PatchLevel::Step> PatchLevel::step_affine(const ImageKernels& kern
   residual.tail<4>() -=
       kAffinePrior * Eigen::Vector4f(deviation(0, 0), deviation(0, 1), deviation(1, 0), deviation(1, 1));
 
-  const Vector6f step = scale * covariance_affine_ * residual;
+  Vector6f step = covariance_affine_ * residual;
+  const float chi2 = chi2_of(step.dot(residual), p, energy_, 6);
+  step *= scale;
   Eigen::Matrix2f change;
   change << 1.0F + step[2], step[3], step[4], 1.0F + step[5];
   const Eigen::Matrix2f next = warp.affine * change.inverse();
@@ -161,7 +171,7 @@ std::optional<PatchLevel::Step> PatchLevel::step_affine(const ImageKernels& kern
   const Eigen::Vector2f moved = -(next * step.head<2>());
   warp.centre += moved;
   warp.affine = next;
-  return Step{p.correlation, moved};
+  return Step{p.correlation, moved, chi2};
 }
 
 std::optional<float> PatchLevel::correlate(const ImageKernels& kernels, const GreyLevel& level,

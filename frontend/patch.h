@@ -5,6 +5,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <limits>
 #include <optional>
 
 #include "frontend/grey_level.h"
@@ -34,6 +35,9 @@ class PatchLevel {
   struct Step {
     float correlation = -1.0F;                        ///< zero-mean normalized *before* the step, -1 to 1
     Eigen::Vector2f moved = Eigen::Vector2f::Zero();  ///< of the centre [px of this level]
+    /// How far it led, squared, against the covariance of what it estimates (chi-square). That comes from what the patch
+    /// and the image differ by after the step; infinite where this is nothing.
+    float chi2 = std::numeric_limits<float>::infinity();
   };
 
   /// One Gauss-Newton step of the position, `scale` times as long; nothing if the patch leaves the image or does not

@@ -2,6 +2,7 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <cstdlib>
 
 namespace ear {
 namespace {
@@ -13,6 +14,9 @@ constexpr float kPositionSettled = 0.25F;
 constexpr int kAffineSteps = 6;
 constexpr float kAffineSettled = 0.02F;
 constexpr float kMaxUnsettled = 0.1F;  // [px] a last step this long is still a match: noise keeps weak patches moving
+// A step that leads less far than this share of the standard deviation of what it estimates is the last: what is left
+// after it is a fraction of the step.
+const float kMaxChi2 = std::getenv("K_CHI2") ? static_cast<float>(std::atof(std::getenv("K_CHI2"))) : 0.0F;
 constexpr float kMinScale = 0.3F;      // of steps that overshoot
 constexpr float kMaxStretch = 2.5F;    // of the affine map: beyond, the patch is no longer what it was
 
@@ -41,7 +45,7 @@ std::optional<PatchLevel::Step> settle(int max_steps, float short_enough, DoStep
       if (ratio < 0.0F) scale = std::max(scale / (1.0F - ratio), kMinScale);
     }
     last = step;
-    if (step->moved.squaredNorm() < short_enough * short_enough) break;
+    if (step->moved.squaredNorm() < short_enough * short_enough || step->chi2 < kMaxChi2) break;
   }
   return last;
 }
