@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
-#include <opencv2/calib3d.hpp>
-#include <opencv2/core/mat.hpp>
 #include <optional>
+
+#include "frontend/essential_matrix.h"
 
 namespace ear {
 namespace {
@@ -20,8 +20,8 @@ constexpr double kGoodGuess = 0.8;          // share of inliers at which a known
 constexpr double kUnknownDepthSigma = 3.0;  // [1/m] a feature without depth may be anywhere beyond 0.2 m or so
 constexpr int kRefinements = 3;
 constexpr double kSettled = 0.03;  // times the tolerance: a step that moves no flow further is the last
-constexpr double kStill = 0.5;  // times the tolerance: a smaller flow is none
-constexpr double kMoved = 3.0;  // times the tolerance: so far off the known motion is more than its error
+constexpr double kStill = 0.5;     // times the tolerance: a smaller flow is none
+constexpr double kMoved = 3.0;     // times the tolerance: so far off the known motion is more than its error
 
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
@@ -193,19 +193,6 @@ void search(const Problem& problem, const std::vector<std::size_t>& from, std::m
   }
 }
 
-// Neither depth nor rotation: the essential matrix, by OpenCV. A static or purely turning camera fits it as well.
-Flags essential_inliers(const std::vector<Flow>& flows, double tolerance) {
-  std::vector<cv::Point2d> from;
-  std::vector<cv::Point2d> to;
-  for (const Flow& flow : flows) {
-    from.emplace_back(flow.x0.x(), flow.x0.y());
-    to.emplace_back(flow.x1.x(), flow.x1.y());
-  }
-  std::vector<std::uint8_t> mask;
-  cv::findEssentialMat(from, to, cv::Mat::eye(3, 3, CV_64F), cv::RANSAC, kConfidence, tolerance, mask);
-  return mask.size() == flows.size() ? mask : Flags(flows.size(), 1);
-}
-
 }  // namespace
 
 void FlowCheck::reserve(std::size_t flows) {
@@ -235,7 +222,7 @@ void FlowCheck::find_into(const std::vector<Flow>& flows, const MotionGuess& gue
   }
   const bool metric = with_depth.size() >= kMinDepths;
   if (!metric && !guess.rotation_known) {
-    flags = essential_inliers(flows, tolerance_);
+    flags = essential_inliers(flows, tolerance_, kConfidence);
     return;
   }
 

@@ -114,7 +114,7 @@ class Frontend::Impl {
   std::size_t max_features_ = 0;  // for now
   bool use_right_ = true;
   bool right_present_ = false;
-  MotionGuess motion_;    // of the left camera, last frame to this one
+  MotionGuess motion_;     // of the left camera, last frame to this one
   float surprise_ = kFar;  // largest of the last frame's probes [px]
   std::vector<Track> tracks_;
   std::vector<Track> previous_;  // the same tracks, index by index, before this frame
@@ -263,8 +263,7 @@ MotionGuess Frontend::Impl::track_probes(const MotionGuess& guess) {
   for (std::size_t k = 0; k < candidates_.size(); k += stride) {
     const std::size_t i = candidates_[k];
     Track& track = tracks_[i];
-    if (!track_one(track, guess.motion, level) &&
-        !track_one(track, guess.motion, kLevelUnknown)) {
+    if (!track_one(track, guess.motion, level) && !track_one(track, guess.motion, kLevelUnknown)) {
       continue;
     }
     probes_.push_back(i);

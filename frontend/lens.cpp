@@ -10,7 +10,7 @@ namespace {
 constexpr int kMaxNewtonSteps = 20;
 // In normalized coordinates. A step's error is of the order of its square: far below a millionth of a pixel.
 constexpr double kNewtonTolerance = 1e-6;
-constexpr double kMaxTangent = 20.0;        // rays flatter than 87 degrees have no usable x/z
+constexpr double kMaxTangent = 20.0;  // rays flatter than 87 degrees have no usable x/z
 
 struct Distorted {
   Eigen::Vector2d value;

@@ -15,8 +15,7 @@ constexpr float kMinGain = 0.1F;  // contrast of the image over that of the patc
 
 // Whether all offsets up to `half` from the centre can be interpolated.
 bool inside(const GreyLevel& level, const Warp& warp, float half) {
-  const float widest = 1.0F + half * warp.perspective.cwiseAbs().sum();
-  const Eigen::Vector2f reach = half * widest * warp.affine.cwiseAbs().rowwise().sum();
+  const Eigen::Vector2f reach = warp.reach(half);
   const float low = -static_cast<float>(level.border);
   const float high_x = static_cast<float>(level.width + level.border) - 2.0F;
   const float high_y = static_cast<float>(level.height + level.border) - 2.0F;
@@ -71,14 +70,14 @@ float smaller_eigenvalue(const Eigen::Matrix2f& m) {
 
 }  // namespace
 
-bool PatchLevel::capture(const ImageKernels& kernels, const GreyLevel& level, const Eigen::Vector2f& centre) {
-  constexpr float kReach = 2.0F;  // of the derivative filter
-  if (!inside(level, Warp{centre}, kPatchHalf + kReach)) return false;
+bool PatchLevel::capture(const ImageKernels& kernels, const GreyLevel& level, const Eigen::Vector2f& centre,
+                         bool affine) {
+  if (!inside(level, Warp{centre}, kCaptured)) return false;
   kernels.capture(level, {centre.x(), centre.y()}, pixels_);
-  return solve_normal_equations(kernels);
+  return solve_normal_equations(kernels, affine);
 }
 
-bool PatchLevel::solve_normal_equations(const ImageKernels& kernels) {
+bool PatchLevel::solve_normal_equations(const ImageKernels& kernels, bool affine) {
   PatchMoments moments;
   kernels.moments(pixels_, moments);
   energy_ = moments.energy;
@@ -124,6 +123,7 @@ bool PatchLevel::solve_normal_equations(const ImageKernels& kernels) {
   corner_strength_ = smaller_eigenvalue(structure);
   if (!(corner_strength_ > 1.0F)) return false;
   covariance_position_ = structure.inverse();
+  if (!affine) return true;
   information.diagonal().tail<4>().array() += kAffinePrior;
   covariance_affine_ = information.llt().solve(Matrix6f::Identity());
   return true;
