@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
-#include <opencv2/calib3d.hpp>
-#include <opencv2/core/mat.hpp>
 #include <optional>
+
+#include "frontend/essential_matrix.h"
 
 namespace ear {
 namespace {
@@ -19,8 +19,9 @@ constexpr double kConfidence = 0.999;
 constexpr double kGoodGuess = 0.8;          // share of inliers at which a known motion needs no search
 constexpr double kUnknownDepthSigma = 3.0;  // [1/m] a feature without depth may be anywhere beyond 0.2 m or so
 constexpr int kRefinements = 3;
-constexpr double kStill = 0.5;  // times the tolerance: a smaller flow is none
-constexpr double kMoved = 3.0;  // times the tolerance: so far off the known motion is more than its error
+constexpr double kSettled = 0.03;  // times the tolerance: a step that moves no flow further is the last
+constexpr double kStill = 0.5;     // times the tolerance: a smaller flow is none
+constexpr double kMoved = 3.0;     // times the tolerance: so far off the known motion is more than its error
 
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
@@ -74,14 +75,18 @@ struct Problem {
   }
 };
 
-// Gauss-Newton over rotation and translation, on the given flows with depth.
-std::optional<Transfer> refine(const std::vector<Flow>& flows, const Flags& used, Transfer motion, int steps) {
+// Gauss-Newton over rotation and translation, on the given flows with depth; until a step moves no flow by more than
+// `settled` of normalized coordinates.
+std::optional<Transfer> refine(const std::vector<Flow>& flows, const Flags& used, Transfer motion, int steps,
+                               double settled) {
+  double nearest = 0.0;  // inverse depth
   for (int step = 0; step < steps; ++step) {
     Matrix6d information = Matrix6d::Zero();
     Vector6d gradient = Vector6d::Zero();
     for (std::size_t i = 0; i < flows.size(); ++i) {
       const Flow& flow = flows[i];
       if (!used[i] || !flow.has_depth) continue;
+      nearest = std::max(nearest, flow.inverse_depth0);
       const Eigen::Vector3d point = motion.scaled_point(flow.x0, flow.inverse_depth0);
       if (!(point.z() > 1e-3)) continue;
       const double inverse_z = 1.0 / point.z();
@@ -105,6 +110,9 @@ std::optional<Transfer> refine(const std::vector<Flow>& flows, const Flags& used
       motion.R_10 = Eigen::AngleAxisd(angle, change.head<3>() / angle).toRotationMatrix() * motion.R_10;
     }
     motion.p_10 += change.tail<3>();
+    // What is left after a step is of the order of its square. No flow moves further than the angle and the translation
+    // in units of its depth.
+    if (angle + nearest * change.tail<3>().norm() < settled) break;
   }
   return motion;
 }
@@ -185,19 +193,6 @@ void search(const Problem& problem, const std::vector<std::size_t>& from, std::m
   }
 }
 
-// Neither depth nor rotation: the essential matrix, by OpenCV. A static or purely turning camera fits it as well.
-Flags essential_inliers(const std::vector<Flow>& flows, double tolerance) {
-  std::vector<cv::Point2d> from;
-  std::vector<cv::Point2d> to;
-  for (const Flow& flow : flows) {
-    from.emplace_back(flow.x0.x(), flow.x0.y());
-    to.emplace_back(flow.x1.x(), flow.x1.y());
-  }
-  std::vector<std::uint8_t> mask;
-  cv::findEssentialMat(from, to, cv::Mat::eye(3, 3, CV_64F), cv::RANSAC, kConfidence, tolerance, mask);
-  return mask.size() == flows.size() ? mask : Flags(flows.size(), 1);
-}
-
 }  // namespace
 
 void FlowCheck::reserve(std::size_t flows) {
@@ -227,7 +222,7 @@ void FlowCheck::find_into(const std::vector<Flow>& flows, const MotionGuess& gue
   }
   const bool metric = with_depth.size() >= kMinDepths;
   if (!metric && !guess.rotation_known) {
-    flags = essential_inliers(flows, tolerance_);
+    flags = essential_inliers(flows, tolerance_, kConfidence);
     return;
   }
 
@@ -257,6 +252,7 @@ void FlowCheck::find_into(const std::vector<Flow>& flows, const MotionGuess& gue
     return drop_fixed(flows, guess, tolerance_, best.flags);
   }
 
+  const double settled = kSettled * tolerance_;
   if (search_needed && guess.rotation_known) {
     search<2>(
         problem, with_depth, random_,
@@ -272,12 +268,12 @@ void FlowCheck::find_into(const std::vector<Flow>& flows, const MotionGuess& gue
         [&](const std::array<std::size_t, 3>& s) -> std::optional<Transfer> {
           used_.assign(flows.size(), 0);
           for (const std::size_t i : s) used_[i] = 1;
-          return refine(flows, used_, guess.motion, 5);
+          return refine(flows, used_, guess.motion, 5, settled);
         },
         best, trial_);
   }
   // Gyroscope and prediction are not perfect: let the inliers correct them, then decide.
-  const std::optional<Transfer> refined = refine(flows, best.flags, best.motion, kRefinements);
+  const std::optional<Transfer> refined = refine(flows, best.flags, best.motion, kRefinements, settled);
   if (refined) {
     problem.classify(*refined, trial_);
     const std::size_t inliers = count(trial_);

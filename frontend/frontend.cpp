@@ -26,6 +26,7 @@ constexpr double kDisparitySigmaPx = 1.0;  // for the depth's part of that toler
 constexpr int kLevelMeasured = 0;          // where to begin: with depth and a motion measured in this frame,
 constexpr int kLevelPredicted = 2;         // with a predicted rotation,
 constexpr int kLevelUnknown = ImagePyramid::kMaxLevels - 1;  // and without
+constexpr float kFar = 1e3F;                                 // [px] of a prediction: nothing is known of its error
 constexpr std::size_t kProbes = 24;                          // features that measure the motion for the others
 constexpr float kRefreshStretch = 1.3F;  // a feature that has grown or shrunk this much gets a new patch
 
@@ -39,6 +40,7 @@ struct Track {
   SurfacePatch surface;    // in the left camera of this frame; at infinity without depth
   bool has_right = false;  // seen by the right camera in this frame
   Eigen::Vector2d right_ray = Eigen::Vector2d::Zero();
+  float surprise = 0.0F;  // in the left image, distance from where the motion put it [px]
 };
 
 // Seconds since the last call.
@@ -88,6 +90,7 @@ class Frontend::Impl {
   void track(const MotionPrediction& prediction);
   [[nodiscard]] MotionGuess track_probes(const MotionGuess& guess);
   [[nodiscard]] bool track_one(Track& track, const Transfer& motion, int level) const;
+  [[nodiscard]] int probe_level(const MotionGuess& guess) const;
   [[nodiscard]] Flow flow(std::size_t track) const;
   void reject();
   void match_stereo();
@@ -111,7 +114,8 @@ class Frontend::Impl {
   std::size_t max_features_ = 0;  // for now
   bool use_right_ = true;
   bool right_present_ = false;
-  MotionGuess motion_;  // of the left camera, last frame to this one
+  MotionGuess motion_;     // of the left camera, last frame to this one
+  float surprise_ = kFar;  // largest of the last frame's probes [px]
   std::vector<Track> tracks_;
   std::vector<Track> previous_;  // the same tracks, index by index, before this frame
   std::vector<ReferencePatch> patches_;
@@ -158,6 +162,7 @@ void Frontend::Impl::allocate() {
 
 void Frontend::Impl::reset() {
   tracks_.clear();
+  surprise_ = kFar;
   left_.clear();
   free_patches_.clear();
   for (std::size_t i = 0; i < patches_.size(); ++i) free_patches_.push_back(i);
@@ -234,6 +239,16 @@ void Frontend::Impl::track(const MotionPrediction& prediction) {
   drop(keep);
 }
 
+// A level is coarse enough if twice the largest error of the last prediction lies within two of its pixels, from where
+// alignment finds the way. Errors that have grown since then show: the probe fails and is tried again.
+int Frontend::Impl::probe_level(const MotionGuess& guess) const {
+  if (!guess.rotation_known) return kLevelUnknown;
+  if (!guess.translation_known) return kLevelPredicted;
+  int level = 0;
+  while (level < kLevelPredicted && surprise_ > static_cast<float>(1 << level)) ++level;
+  return level;
+}
+
 // Follows a few features from coarse to fine. If they agree on a motion, it is better than any prediction, and all
 // others are found at once on the finest level.
 MotionGuess Frontend::Impl::track_probes(const MotionGuess& guess) {
@@ -244,11 +259,11 @@ MotionGuess Frontend::Impl::track_probes(const MotionGuess& guess) {
     if (tracks_[i].has_depth) candidates_.push_back(i);
   }
   const std::size_t stride = std::max<std::size_t>(1, candidates_.size() / kProbes);
+  const int level = probe_level(guess);
   for (std::size_t k = 0; k < candidates_.size(); k += stride) {
     const std::size_t i = candidates_[k];
     Track& track = tracks_[i];
-    if (!track_one(track, guess.motion, guess.rotation_known ? kLevelPredicted : kLevelUnknown) &&
-        !track_one(track, guess.motion, kLevelUnknown)) {
+    if (!track_one(track, guess.motion, level) && !track_one(track, guess.motion, kLevelUnknown)) {
       continue;
     }
     probes_.push_back(i);
@@ -259,7 +274,12 @@ MotionGuess Frontend::Impl::track_probes(const MotionGuess& guess) {
     keep_[probes_[k]] = consensus.inliers[k];
     if (!consensus.inliers[k]) tracks_[probes_[k]] = previous_[probes_[k]];  // to be tried again like the others
   }
+  surprise_ = kFar;
   if (!consensus.metric) return guess;
+  surprise_ = 0.0F;
+  for (std::size_t k = 0; k < probes_.size(); ++k) {
+    if (consensus.inliers[k]) surprise_ = std::max(surprise_, tracks_[probes_[k]].surprise);
+  }
   return {consensus.motion, true, true};
 }
 
@@ -277,6 +297,7 @@ bool Frontend::Impl::track_one(Track& track, const Transfer& motion, int level) 
   const auto ray = lens_.to_normalized(found.cast<double>());
   if (!ray) return false;
   track.surface = track.surface.seen_after(motion, track.left_ray, *ray);
+  track.surprise = (found - start->centre).norm();
   track.left = match->warp;
   track.left_ray = *ray;
   track.has_right = false;

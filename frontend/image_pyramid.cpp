@@ -8,6 +8,8 @@ namespace ear {
 namespace {
 
 constexpr int kSmallest = ImagePyramid::kBorder;  // [px] no level but the first is so narrow or low
+constexpr int kBand = 32;                         // rows; the last one of a level is higher, up to twice
+static_assert(kBand > ImagePyramid::kBorder, "a border mirrors one band");
 
 // The row of an image that one beyond its edge mirrors, without repeating that at the edge. The same for columns.
 int mirrored(int row, int height) {
@@ -17,20 +19,41 @@ int mirrored(int row, int height) {
   return std::min(within, period - within);
 }
 
+// Rows, or bands of them, from `first` to before `end`.
+struct Range {
+  int first, end;
+};
+
+int bands_of(int height) { return std::max(1, height / kBand); }
+
+Range rows_of(int band, int height) {
+  return {band * kBand, band + 1 == bands_of(height) ? height : (band + 1) * kBand};
+}
+
+// The bands that are seen from row `first` to `last`, also by way of the border.
+Range bands_seen(int first, int last, int height) {
+  const auto inside = [&](int row) { return std::clamp(row, 0, height - 1); };
+  const int highest = std::min(inside(first), last >= height ? inside(2 * (height - 1) - last) : height - 1);
+  const int lowest = std::max(inside(last), first < 0 ? inside(-first) : 0);
+  const auto band = [&](int row) { return std::min(row / kBand, bands_of(height) - 1); };
+  return {band(highest), band(lowest) + 1};
+}
+
 std::uint8_t* row_of(std::uint8_t* origin, const GreyLevel& level, int row) { return origin + row * level.stride; }
 
-// Fills the border from what is inside.
-void mirror_edges(const GreyLevel& level, std::uint8_t* origin) {
-  for (int row = 0; row < level.height; ++row) {
+// Fills the border that mirrors these rows.
+void mirror_edges(const GreyLevel& level, std::uint8_t* origin, const Range& rows) {
+  constexpr int kBorder = ImagePyramid::kBorder;
+  for (int row = rows.first; row < rows.end; ++row) {
     std::uint8_t* const first = row_of(origin, level, row);
     std::uint8_t* const last = first + level.width - 1;
-    if (level.width > ImagePyramid::kBorder) {
-      for (int i = 1; i <= ImagePyramid::kBorder; ++i) {
+    if (level.width > kBorder) {
+      for (int i = 1; i <= kBorder; ++i) {
         first[-i] = first[i];
         last[i] = last[-i];
       }
     } else {
-      for (int i = 1; i <= ImagePyramid::kBorder; ++i) {
+      for (int i = 1; i <= kBorder; ++i) {
         first[-i] = first[mirrored(-i, level.width)];
         last[i] = first[mirrored(level.width - 1 + i, level.width)];
       }
@@ -41,16 +64,14 @@ void mirror_edges(const GreyLevel& level, std::uint8_t* origin) {
     std::memcpy(row_of(origin, level, row) - level.border,
                 row_of(origin, level, mirrored(row, level.height)) - level.border, bytes);
   };
-  for (int i = 1; i <= level.border; ++i) {
-    copy(-i);
-    copy(level.height - 1 + i);
-  }
+  for (int i = 1; rows.first == 0 && i <= level.border; ++i) copy(-i);
+  for (int i = 1; rows.end == level.height && i <= level.border; ++i) copy(level.height - 1 + i);
 }
 
 }  // namespace
 
 bool ImagePyramid::shows(const ImageView& image) const {
-  if (levels_.empty() || levels_.front().width != image.width || levels_.front().height != image.height) return false;
+  if (!built_ || levels_.front().width != image.width || levels_.front().height != image.height) return false;
   const GreyLevel& base = levels_.front();
   for (std::ptrdiff_t row = 0; row < image.height; ++row) {
     const std::uint8_t* const pixels = image.data + row * image.stride;
@@ -60,19 +81,19 @@ bool ImagePyramid::shows(const ImageView& image) const {
 }
 
 void ImagePyramid::allocate(int width, int height) {
-  allocated_.clear();
-  memory_.clear();
+  levels_.clear();
   sums_.assign(static_cast<std::size_t>(width) + 64, 0);
-  while (static_cast<int>(allocated_.size()) < max_levels_) {
-    GreyLevel level;
+  while (static_cast<int>(levels_.size()) < max_levels_) {
+    Level level;
     level.width = width;
     level.height = height;
     level.border = kBorder;
     level.stride = (width + 2 * kBorder + 15) / 16 * 16;
     const std::ptrdiff_t rows = height + 2 * kBorder + 2;  // kernels read a row more on either side, see kReadBehind
-    memory_.emplace_back(static_cast<std::size_t>(rows * level.stride + kReadBehind));
-    level.origin = memory_.back().data() + (1 + kBorder) * level.stride + kBorder;
-    allocated_.push_back(level);
+    level.memory.resize(static_cast<std::size_t>(rows * level.stride + kReadBehind));
+    level.origin = level.memory.data() + (1 + kBorder) * level.stride + kBorder;
+    level.made.resize(static_cast<std::size_t>(bands_of(height)));
+    levels_.push_back(std::move(level));
     width = (width + 1) / 2;
     height = (height + 1) / 2;
     if (width <= kSmallest || height <= kSmallest) break;
@@ -80,27 +101,50 @@ void ImagePyramid::allocate(int width, int height) {
 }
 
 void ImagePyramid::build(const ImageView& image) {
-  const bool fits =
-      !allocated_.empty() && allocated_.front().width == image.width && allocated_.front().height == image.height;
+  const bool fits = !levels_.empty() && levels_.front().width == image.width && levels_.front().height == image.height;
   if (!fits) allocate(image.width, image.height);
-  const auto origin_of = [&](std::size_t i) {
-    return memory_[i].data() + (1 + kBorder) * allocated_[i].stride + kBorder;
-  };
+  const Level& base = levels_.front();
   for (int row = 0; row < image.height; ++row) {
-    std::memcpy(row_of(origin_of(0), allocated_[0], row), image.data + row * image.stride,
+    std::memcpy(row_of(base.pixels(), base, row), image.data + row * image.stride,
                 static_cast<std::size_t>(image.width));
   }
-  mirror_edges(allocated_[0], origin_of(0));
-  for (std::size_t i = 1; i < allocated_.size(); ++i) {
-    const GreyLevel& finer = allocated_[i - 1];
-    for (int row = 0; row < allocated_[i].height; ++row) {
-      std::array<const std::uint8_t*, 5> rows{};
-      for (int k = 0; k < 5; ++k) rows[static_cast<std::size_t>(k)] = finer.origin + (2 * row + k - 2) * finer.stride;
-      kernels_.halve_row(rows, allocated_[i].width, sums_.data(), row_of(origin_of(i), allocated_[i], row));
-    }
-    mirror_edges(allocated_[i], origin_of(i));
+  mirror_edges(base, base.pixels(), {0, image.height});
+  std::fill(base.made.begin(), base.made.end(), std::uint8_t{1});
+  for (std::size_t i = 1; i < levels_.size(); ++i) {
+    std::fill(levels_[i].made.begin(), levels_[i].made.end(), std::uint8_t{0});
   }
-  levels_ = allocated_;
+  built_ = true;
+}
+
+const GreyLevel& ImagePyramid::level(int index) const {
+  return level(index, 0, levels_[static_cast<std::size_t>(index)].height - 1);
+}
+
+const GreyLevel& ImagePyramid::level(int index, int first, int last) const {
+  const auto i = static_cast<std::size_t>(index);
+  const Level& level = levels_[i];
+  if (index == 0) return level;
+  const Range bands = bands_seen(first, last, level.height);
+  for (auto band = static_cast<std::size_t>(bands.first); band < static_cast<std::size_t>(bands.end); ++band) {
+    if (level.made[band] == 0) make(i, band);
+  }
+  return level;
+}
+
+void ImagePyramid::make(std::size_t index, std::size_t band) const {
+  constexpr int kReach = 2;  // of the filter, on the finer level
+  const Level& out = levels_[index];
+  const Range rows = rows_of(static_cast<int>(band), out.height);
+  const GreyLevel& finer = level(static_cast<int>(index) - 1, 2 * rows.first - kReach, 2 * (rows.end - 1) + kReach);
+  for (int row = rows.first; row < rows.end; ++row) {
+    std::array<const std::uint8_t*, 5> taps{};
+    for (int k = 0; k < 5; ++k) {
+      taps[static_cast<std::size_t>(k)] = finer.origin + (2 * row + k - kReach) * finer.stride;
+    }
+    kernels_.halve_row(taps, out.width, sums_.data(), row_of(out.pixels(), out, row));
+  }
+  mirror_edges(out, out.pixels(), rows);
+  out.made[band] = 1;
 }
 
 }  // namespace ear

@@ -272,7 +272,7 @@ void capture(const GreyLevel& level, const std::array<float, 2>& centre, PatchPi
   for (int row = 0; row < kWide; ++row, corner += level.stride) {
     float* const out = wide + row * kRow;
     const std::uint8_t* const below = corner + level.stride;
-    for (int i = 0; i < kWide; ++i) {
+    for (int i = 0; i < kRow; ++i) {  // in eights; the last four are not looked at
       const auto top = static_cast<float>(corner[i]);
       const auto bottom = static_cast<float>(below[i]);
       const float left = top + weight_x * (static_cast<float>(corner[i + 1]) - top);

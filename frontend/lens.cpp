@@ -8,8 +8,9 @@ namespace ear {
 namespace {
 
 constexpr int kMaxNewtonSteps = 20;
-constexpr double kNewtonTolerance = 1e-12;  // in normalized coordinates: far below a millionth of a pixel
-constexpr double kMaxTangent = 20.0;        // rays flatter than 87 degrees have no usable x/z
+// In normalized coordinates. A step's error is of the order of its square: far below a millionth of a pixel.
+constexpr double kNewtonTolerance = 1e-6;
+constexpr double kMaxTangent = 20.0;  // rays flatter than 87 degrees have no usable x/z
 
 struct Distorted {
   Eigen::Vector2d value;
@@ -92,6 +93,26 @@ std::optional<Eigen::Vector2d> Lens::to_pixel(const Eigen::Vector2d& normalized)
     distorted = distort(k_, normalized).value;
   }
   return distorted.cwiseProduct(focal_) + centre_;
+}
+
+std::optional<Lens::Projection> Lens::project(const Eigen::Vector2d& normalized) const {
+  const double radius2 = normalized.squaredNorm();
+  Distorted d;
+  if (model_ == LensModel::equidistant) {
+    const double radius = std::sqrt(radius2);
+    const double angle = std::atan(radius);
+    if (!(angle <= max_radius_)) return std::nullopt;
+    const DistortedAngle distorted = distort_angle(k_, angle);
+    const double scale = radius > 1e-9 ? distorted.value / radius : 1.0;
+    const double slope = distorted.slope / (1.0 + radius2);  // by the radius
+    const Eigen::Vector2d direction = radius > 1e-9 ? Eigen::Vector2d(normalized / radius) : Eigen::Vector2d::Zero();
+    d.value = scale * normalized;
+    d.J_value_point = scale * Eigen::Matrix2d::Identity() + (slope - scale) * direction * direction.transpose();
+  } else {
+    if (!(radius2 <= max_radius_ * max_radius_)) return std::nullopt;
+    d = distort(k_, normalized);
+  }
+  return Projection{d.value.cwiseProduct(focal_) + centre_, focal_.asDiagonal() * d.J_value_point};
 }
 
 std::optional<Eigen::Vector2d> Lens::undistort_radial_tangential(const Eigen::Vector2d& distorted) const {

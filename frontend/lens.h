@@ -23,6 +23,14 @@ class Lens {
   /// The pixel may lie outside the image.
   [[nodiscard]] std::optional<Eigen::Vector2d> to_pixel(const Eigen::Vector2d& normalized) const;
 
+  struct Projection {
+    Eigen::Vector2d pixel;        ///< [px]
+    Eigen::Matrix2d J_pixel_ray;  ///< by the normalized coordinates [px]
+  };
+
+  /// to_pixel() and its derivative.
+  [[nodiscard]] std::optional<Projection> project(const Eigen::Vector2d& normalized) const;
+
   /// Mean focal length [px]: turns small distances in normalized coordinates into pixels.
   [[nodiscard]] double focal_px() const { return 0.5 * (focal_.x() + focal_.y()); }
 

@@ -15,8 +15,7 @@ constexpr float kMinGain = 0.1F;  // contrast of the image over that of the patc
 
 // Whether all offsets up to `half` from the centre can be interpolated.
 bool inside(const GreyLevel& level, const Warp& warp, float half) {
-  const float widest = 1.0F + half * warp.perspective.cwiseAbs().sum();
-  const Eigen::Vector2f reach = half * widest * warp.affine.cwiseAbs().rowwise().sum();
+  const Eigen::Vector2f reach = warp.reach(half);
   const float low = -static_cast<float>(level.border);
   const float high_x = static_cast<float>(level.width + level.border) - 2.0F;
   const float high_y = static_cast<float>(level.height + level.border) - 2.0F;
@@ -49,6 +48,13 @@ Photometry photometry_of(const AlignmentSums& sums, float energy) {
   return p;
 }
 
+// Of a step that takes `decrease` off the sum of squared differences (patch less image, in units of the patch).
+float chi2_of(float decrease, const Photometry& before, float energy, int parameters) {
+  const float difference = energy * (1.0F / (before.correlation * before.correlation) - 1.0F);
+  const float noise = (difference - decrease) / static_cast<float>(kPatchPixels - parameters - 2);  // gain and offset
+  return noise > 0.0F ? decrease / noise : std::numeric_limits<float>::infinity();
+}
+
 Eigen::Vector3f vector_of(const Moments& m) { return {m.one, m.x, m.y}; }
 
 Eigen::Matrix3f matrix_of(const Moments& m) {
@@ -64,14 +70,14 @@ float smaller_eigenvalue(const Eigen::Matrix2f& m) {
 
 }  // namespace
 
-bool PatchLevel::capture(const ImageKernels& kernels, const GreyLevel& level, const Eigen::Vector2f& centre) {
-  constexpr float kReach = 2.0F;  // of the derivative filter
-  if (!inside(level, Warp{centre}, kPatchHalf + kReach)) return false;
+bool PatchLevel::capture(const ImageKernels& kernels, const GreyLevel& level, const Eigen::Vector2f& centre,
+                         bool affine) {
+  if (!inside(level, Warp{centre}, kCaptured)) return false;
   kernels.capture(level, {centre.x(), centre.y()}, pixels_);
-  return solve_normal_equations(kernels);
+  return solve_normal_equations(kernels, affine);
 }
 
-bool PatchLevel::solve_normal_equations(const ImageKernels& kernels) {
+bool PatchLevel::solve_normal_equations(const ImageKernels& kernels, bool affine) {
   PatchMoments moments;
   kernels.moments(pixels_, moments);
   energy_ = moments.energy;
@@ -117,6 +123,7 @@ bool PatchLevel::solve_normal_equations(const ImageKernels& kernels) {
   corner_strength_ = smaller_eigenvalue(structure);
   if (!(corner_strength_ > 1.0F)) return false;
   covariance_position_ = structure.inverse();
+  if (!affine) return true;
   information.diagonal().tail<4>().array() += kAffinePrior;
   covariance_affine_ = information.llt().solve(Matrix6f::Identity());
   return true;
@@ -130,10 +137,11 @@ std::optional<PatchLevel::Step> PatchLevel::step_position(const ImageKernels& ke
   const Photometry p = photometry_of(sums, energy_);
   if (!(p.gain > kMinGain)) return std::nullopt;
   const Eigen::Vector2f residual =
-      Eigen::Vector2f(sums.x, sums.y) - p.mean * J_sum_.head<2>() - p.gain * J_value_.head<2>();
-  const Eigen::Vector2f moved = warp.affine * (covariance_position_ * residual) * (-scale / p.gain);
+      (Eigen::Vector2f(sums.x, sums.y) - p.mean * J_sum_.head<2>() - p.gain * J_value_.head<2>()) / p.gain;
+  const Eigen::Vector2f step = covariance_position_ * residual;
+  const Eigen::Vector2f moved = warp.affine * step * -scale;
   warp.centre += moved;
-  return Step{p.correlation, moved};
+  return Step{p.correlation, moved, chi2_of(step.dot(residual), p, energy_, 2)};
 }
 
 std::optional<PatchLevel::Step> PatchLevel::step_affine(const ImageKernels& kernels, const GreyLevel& level,
@@ -153,7 +161,9 @@ std::optional<PatchLevel::Step> PatchLevel::step_affine(const ImageKernels& kern
   residual.tail<4>() -=
       kAffinePrior * Eigen::Vector4f(deviation(0, 0), deviation(0, 1), deviation(1, 0), deviation(1, 1));
 
-  const Vector6f step = scale * covariance_affine_ * residual;
+  Vector6f step = covariance_affine_ * residual;
+  const float chi2 = chi2_of(step.dot(residual), p, energy_, 6);
+  step *= scale;
   Eigen::Matrix2f change;
   change << 1.0F + step[2], step[3], step[4], 1.0F + step[5];
   const Eigen::Matrix2f next = warp.affine * change.inverse();
@@ -161,7 +171,7 @@ std::optional<PatchLevel::Step> PatchLevel::step_affine(const ImageKernels& kern
   const Eigen::Vector2f moved = -(next * step.head<2>());
   warp.centre += moved;
   warp.affine = next;
-  return Step{p.correlation, moved};
+  return Step{p.correlation, moved, chi2};
 }
 
 std::optional<float> PatchLevel::correlate(const ImageKernels& kernels, const GreyLevel& level,

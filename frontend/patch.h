@@ -5,6 +5,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <limits>
 #include <optional>
 
 #include "frontend/grey_level.h"
@@ -18,14 +19,22 @@ struct Warp {
   Eigen::Vector2f centre = Eigen::Vector2f::Zero();       ///< [px]
   Eigen::Matrix2f affine = Eigen::Matrix2f::Identity();   ///< patch offset to image offset, at the centre
   Eigen::Vector2f perspective = Eigen::Vector2f::Zero();  ///< how the scale shrinks along the patch [1/px]
+
+  /// How far from the centre offsets of up to `half` are seen, at most [px].
+  [[nodiscard]] Eigen::Vector2f reach(float half) const {
+    const float widest = 1.0F + half * perspective.cwiseAbs().sum();
+    return half * widest * affine.cwiseAbs().rowwise().sum();
+  }
 };
 
 /// A patch at one level of a pyramid. All variants of the kernels give the same bits.
 class PatchLevel {
  public:
   /// Takes the patch around `centre` [px of this level]. False if it reaches outside the level's border or has no
-  /// texture in one direction; the patch is then unusable.
-  bool capture(const ImageKernels& kernels, const GreyLevel& level, const Eigen::Vector2f& centre);
+  /// texture in one direction; the patch is then unusable. `affine`: also for steps of the affine map.
+  bool capture(const ImageKernels& kernels, const GreyLevel& level, const Eigen::Vector2f& centre, bool affine = true);
+
+  static constexpr float kCaptured = kPatchHalf + 2.0F;  ///< [px] from the centre, with the derivative's reach
 
   /// Smaller eigenvalue of the patch's structure matrix [grey^2]: the variance of the image noise divided by it is the
   /// variance of the patch's position along the direction that it sees worst [px^2].
@@ -34,6 +43,9 @@ class PatchLevel {
   struct Step {
     float correlation = -1.0F;                        ///< zero-mean normalized *before* the step, -1 to 1
     Eigen::Vector2f moved = Eigen::Vector2f::Zero();  ///< of the centre [px of this level]
+    /// How far it led, squared, against the covariance of what it estimates (chi-square). That comes from what the
+    /// patch and the image differ by after the step; infinite where this is nothing.
+    float chi2 = std::numeric_limits<float>::infinity();
   };
 
   /// One Gauss-Newton step of the position, `scale` times as long; nothing if the patch leaves the image or does not
@@ -56,7 +68,7 @@ class PatchLevel {
   using Matrix6f = Eigen::Matrix<float, 6, 6>;
 
   // Fills everything below from the pixels. False if the patch has no texture in one direction.
-  bool solve_normal_equations(const ImageKernels& kernels);
+  bool solve_normal_equations(const ImageKernels& kernels, bool affine);
 
   // Order of the parameters: position x, y; affine xx, xy, yx, yy.
   PatchPixels pixels_;

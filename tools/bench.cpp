@@ -96,6 +96,16 @@ void add_bench_command(CLI::App& app) {
   SuiteOptions& options = args->suite_options;
   command->add_option("--folder", options.folder, "Keeps the suite's recordings, and takes those that are there")
       ->needs(suite);
+  command->add_option("--recordings", options.recordings, "Which of them")
+      ->capture_default_str()
+      ->delimiter(',')
+      ->check(CLI::IsMember(suite_recordings()))
+      ->needs(suite);
+  command->add_option("--rates", options.rates_hz, "[Hz] of the camera")
+      ->capture_default_str()
+      ->delimiter(',')
+      ->check(CLI::PositiveNumber)
+      ->needs(suite);
   command->add_option("--repeat", options.repeat, "Runs of each, one after the other; their scatter is shown")
       ->capture_default_str()
       ->check(CLI::PositiveNumber)

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <stdexcept>
 #include <string>
 #include <system_error>
 #include <thread>
@@ -25,7 +27,13 @@ struct SuiteRecording {
 };
 constexpr SuiteRecording kRecordings[] = {
     {"standing", "static", 2.0}, {"drive", "flat1", 3.0}, {"flight", "fly1", 10.0}};
-constexpr double kRates[] = {30.0, 10.0};
+
+const SuiteRecording& recording_named(const std::string& name) {
+  const auto* const found = std::find_if(std::begin(kRecordings), std::end(kRecordings),
+                                         [&](const SuiteRecording& recording) { return recording.name == name; });
+  if (found == std::end(kRecordings)) throw std::invalid_argument("bench: the suite has no recording " + name);
+  return *found;
+}
 
 /// Deletes itself with its end, where it is a temporary one.
 class Folder {
@@ -75,14 +83,20 @@ void make_recording(const SuiteRecording& recording, double rate_hz, double seco
 
 }  // namespace
 
+std::vector<std::string> suite_recordings() {
+  std::vector<std::string> names;
+  for (const SuiteRecording& recording : kRecordings) names.emplace_back(recording.name);
+  return names;
+}
+
 SuiteFigures run_suite(const Config& config, const SuiteOptions& options) {
   const Folder folder(options.folder);
   SuiteFigures figures;
   figures.runs = options.repeat;
-  for (const SuiteRecording& recording : kRecordings) {
-    for (const double rate_hz : kRates) {
-      const std::filesystem::path path =
-          folder.path() / (recording.name + std::string("_") + std::to_string(std::lround(rate_hz)) + "hz");
+  for (const std::string& name : options.recordings) {
+    const SuiteRecording& recording = recording_named(name);
+    for (const double rate_hz : options.rates_hz) {
+      const std::filesystem::path path = folder.path() / (name + "_" + std::to_string(std::lround(rate_hz)) + "hz");
       make_recording(recording, rate_hz, options.seconds, path);
       const auto left_out = static_cast<std::size_t>(std::lround(recording.starts * rate_hz));
       std::vector<std::vector<BenchFigures>> runs(options.features.size());
@@ -91,7 +105,7 @@ SuiteFigures run_suite(const Config& config, const SuiteOptions& options) {
           Config changed = config;
           changed.frontend.max_features = options.features[i];
           Recording source(path);
-          runs[i].push_back(run_bench(changed, source, recording.name, left_out));
+          runs[i].push_back(run_bench(changed, source, name, left_out));
         }
       }
       for (const std::vector<BenchFigures>& same : runs) figures.cells.push_back(suite_cell(rate_hz, same));

@@ -18,7 +18,7 @@ namespace {
 constexpr double kNoise = 2.0;  // [grey values]
 constexpr int kFeatures = 80;
 
-enum class Known { nothing, rotation, motion };
+enum class Known { nothing, rotation, motion, wrong_motion };  // wrong: by 0.06 m
 
 // A stereo vehicle in a scene. Drives the front end along poses and compares what it sees with where things are.
 class Run {
@@ -32,7 +32,8 @@ class Run {
     MotionPrediction prediction;
     if (known != Known::nothing && frames_ > 0) {
       prediction = exact_motion(T_WB_, T_WB);
-      prediction.translation_known = known == Known::motion;
+      prediction.translation_known = known == Known::motion || known == Known::wrong_motion;
+      if (known == Known::wrong_motion) prediction.p_B0B1.x() += 0.06;
     }
     cv::Mat left = renderers_[0].render(T_WB, scene_);
     add_noise(left, kNoise, random_);
@@ -192,6 +193,17 @@ TEST_CASE("front end: large motion over near ground is followed with depth and p
   const int with_nothing = tracked(Known::nothing);
   CHECK(with_motion > 110);
   CHECK(with_nothing < with_motion / 2);
+}
+
+TEST_CASE("front end: a prediction that was good and is off by ten pixels costs no features") {
+  Run run({wall(2.0, 25)});
+  for (int i = 0; i < 9; ++i) {
+    CAPTURE(i);
+    run.step(at({0.03 * i, 0.0, 0.0}), i == 4 || i == 7 ? Known::wrong_motion : Known::motion);
+    if (i > 0) CHECK(run.tracked() > 60);
+  }
+  CHECK(run.rms_px() < 0.1);
+  CHECK(run.wrong_share() < 0.005);
 }
 
 TEST_CASE("front end: slow motion needs no prediction") {

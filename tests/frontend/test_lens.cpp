@@ -68,6 +68,26 @@ TEST_CASE("lens: pixels come back from their rays, to the corners") {
   }
 }
 
+TEST_CASE("lens: the derivative by the ray is that of the pixels") {
+  constexpr double kStep = 1e-6;
+  for (const CameraCalibration& camera : {euroc(), plumb_bob(), fisheye()}) {
+    const Lens lens(camera);
+    for (const Eigen::Vector2d& ray :
+         {Eigen::Vector2d(0.0, 0.0), Eigen::Vector2d(0.3, -0.2), Eigen::Vector2d(-0.5, 0.4)}) {
+      CAPTURE(ray);
+      const auto at = lens.project(ray);
+      REQUIRE(at);
+      CHECK((at->pixel - *lens.to_pixel(ray)).norm() < 1e-9);
+      for (int k = 0; k < 2; ++k) {
+        const Eigen::Vector2d step = kStep * Eigen::Vector2d::Unit(k);
+        const Eigen::Vector2d slope = (*lens.to_pixel(ray + step) - *lens.to_pixel(ray - step)) / (2.0 * kStep);
+        CHECK((at->J_pixel_ray.col(k) - slope).norm() < 1e-5);
+      }
+    }
+    CHECK_FALSE(lens.project({1e3, 0.0}));
+  }
+}
+
 TEST_CASE("lens: the models are OpenCV's") {
   for (const CameraCalibration& camera : {euroc(), plumb_bob(), fisheye()}) {
     const Lens lens(camera);

@@ -1,7 +1,9 @@
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <opencv2/imgproc.hpp>
 #include <random>
 
@@ -56,6 +58,64 @@ TEST_CASE("pyramid: levels halve the image, and its border mirrors it") {
 
 TEST_CASE("pyramid: an image too small for all levels has fewer") {
   CHECK(pyramid_of(random_texture(40, 40, 1)).top_level() < 3);
+}
+
+TEST_CASE("pyramid: rows that are asked for are those of the whole, in whatever order") {
+  std::mt19937 random(4);
+  for (const cv::Size& size : {cv::Size(320, 240), cv::Size(333, 251), cv::Size(70, 41)}) {
+    CAPTURE(size.width);
+    const ImagePyramid whole = pyramid_of(random_texture(size.width, size.height, 3));
+    ImagePyramid asked = pyramid_of(random_texture(size.width, size.height, 4));
+    static_cast<void>(asked.level(asked.top_level()));                 // of the image before, everything
+    asked.build(view_of(random_texture(size.width, size.height, 3)));  // and nothing of this one
+    for (int trial = 0; trial < 40; ++trial) {
+      const int index = static_cast<int>(random() % static_cast<unsigned>(whole.top_level() + 1));
+      const GreyLevel& expected = whole.level(index);
+      constexpr int kBorder = ImagePyramid::kBorder;
+      const int first = static_cast<int>(random() % static_cast<unsigned>(expected.height + kBorder)) - kBorder;
+      const int last = std::min(first + 12, expected.height - 1 + kBorder);
+      CAPTURE(first);
+      const GreyLevel& level = asked.level(index, first, last);
+      for (int row = first; row <= last; ++row) {
+        const auto bytes = static_cast<std::size_t>(level.width + 2 * kBorder);
+        REQUIRE(std::memcmp(level.origin + row * level.stride - kBorder,
+                            expected.origin + row * expected.stride - kBorder, bytes) == 0);
+      }
+    }
+  }
+}
+
+TEST_CASE("patch: a step that only noise makes has a chi-square of one for each parameter") {
+  const cv::Mat image = random_texture(320, 240, 8);
+  const ImagePyramid before = pyramid_of(image);
+  std::mt19937 random(9);
+  for (const double noise : {2.0, 6.0}) {
+    CAPTURE(noise);
+    float position = 0.0F;
+    float affine = 0.0F;
+    int count = 0;
+    for (int trial = 0; trial < 20; ++trial) {
+      cv::Mat noisy = image.clone();
+      add_noise(noisy, noise, random);
+      const ImagePyramid after = pyramid_of(noisy);
+      for (float u = 40.5F; u < 300.0F; u += 40.0F) {
+        const Eigen::Vector2f at(u, 120.5F);
+        PatchLevel patch;
+        REQUIRE(patch.capture(before.kernels(), before.level(0), at));
+        Warp warp{at};
+        const auto first = patch.step_position(after.kernels(), after.level(0), 1.0F, warp);
+        warp = {at};
+        const auto second = patch.step_affine(after.kernels(), after.level(0), Eigen::Matrix2f::Identity(), 1.0F, warp);
+        REQUIRE(first);
+        REQUIRE(second);
+        position += first->chi2;
+        affine += second->chi2;
+        ++count;
+      }
+    }
+    CHECK(position / static_cast<float>(count) == doctest::Approx(2.0).epsilon(0.25));
+    CHECK(affine / static_cast<float>(count) == doctest::Approx(6.0).epsilon(0.25));
+  }
 }
 
 TEST_CASE("patch: a shift is found to a few hundredths of a pixel, from pixels away, whatever the exposure") {

@@ -160,6 +160,24 @@ class EndToEnd(unittest.TestCase):
         self.assertEqual(result.returncode, 0, result)
         return result.stdout
 
+    def test_shortest_suite(self):
+        with tempfile.TemporaryDirectory() as folder:
+            old = Path(folder) / "before.json"
+            suite = ("bench", "--suite", "--folder", folder, "--recordings", "standing", "--rates", "10", "--features", "20,40",
+                     "--seconds", "0.8", "--repeat", "1")
+            old.write_text(self.run_ear(*suite, "--json"), encoding="utf-8")
+            cells = json.loads(old.read_text(encoding="utf-8"))["suite"]
+            self.assertEqual([(cell["recording"], cell["rate_hz"], cell["features"]) for cell in cells],
+                             [("standing", 10, 20), ("standing", 10, 40)])
+            for cell in cells:
+                self.assertEqual(cell["frames"], 8)
+                means = {figure["name"]: figure["value"] for figure in cell["figures"]}
+                self.assertGreater(means["pipeline"], 0.0)
+            made = Path(folder) / "standing_10hz" / "simulation.yaml"
+            written = made.stat().st_mtime_ns
+            self.assertIn("standing", self.run_ear(*suite, "--compare", old))
+            self.assertEqual(made.stat().st_mtime_ns, written, "the recording was made again")
+
     def check_bench(self, recording, old):
         old.write_text(self.run_ear("bench", recording, "--json"), encoding="utf-8")
         figures = json.loads(old.read_text(encoding="utf-8"))

@@ -2,7 +2,8 @@
 """compile_memory.py BUILD_FOLDER [--target ear_program] [--only REGEX] [--limit 1000]
 
 Compiles every source of a target once more, without a compiler cache, and prints the largest resident size of each
-compiler [MB], largest first. Fails if one is over the limit. The folder's generator must be Ninja, and configured.
+compiler [MB] and its processor time [s], largest first, and the sum of the times. Fails if one is over the limit. The
+folder's generator must be Ninja, and configured.
 """
 
 import argparse
@@ -26,22 +27,28 @@ def sources(folder, target, only):
     objects = {name for name in ninja(folder, "inputs", target).split() if name.endswith(".o")}
     for entry in json.loads(ninja(folder, "compdb")):
         if entry["output"] in objects and re.search(only, entry["file"]):
-            command = shlex.split(entry["command"])
-            yield entry["file"], command[1:] if os.path.basename(command[0]) in CACHES else command
+            yield entry["file"], without_cache(shlex.split(entry["command"]))
 
 
-def peak_memory(folder, command):
-    """Of the compiler's largest process [MB]."""
+def without_cache(command):
+    """What follows the cache, and what sets its environment."""
+    caches = [i for i, word in enumerate(command) if os.path.basename(word) in CACHES]
+    return command[caches[0] + 1:] if caches else command
+
+
+def cost(folder, command):
+    """Memory of the compiler's largest process [MB], processor time of all [s]."""
     with tempfile.TemporaryDirectory() as scratch:
         for option, name in (("-o", "object"), ("-MF", "dependencies")):
             if option in command:
                 command[command.index(option) + 1] = os.path.join(scratch, name)
         # A process of its own, so that the maximum over its children is that of one compiler.
         code = "import json,resource,subprocess,sys; subprocess.run(json.loads(sys.argv[1]), check=True);" \
-               "print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)"
+               "u = resource.getrusage(resource.RUSAGE_CHILDREN); print(u.ru_maxrss, u.ru_utime + u.ru_stime)"
         result = subprocess.run([sys.executable, "-c", code, json.dumps(command)], cwd=folder, check=True,
                                 capture_output=True, text=True)
-    return int(result.stdout) // 1000
+    peak, seconds = result.stdout.split()
+    return int(peak) // 1000, float(seconds)
 
 
 def main():
@@ -51,12 +58,13 @@ def main():
     parser.add_argument("--only", default="", help="sources whose path has this")
     parser.add_argument("--limit", type=int, default=1000, help="[MB]")
     arguments = parser.parse_args()
-    peaks = []
+    costs = []
     for source, command in sources(arguments.folder, arguments.target, arguments.only):
-        peaks.append((peak_memory(arguments.folder, command), source))
-    for peak, source in sorted(peaks, reverse=True):
-        print(f"{peak:5} MB  {os.path.relpath(os.path.join(arguments.folder, source))}")
-    return 1 if any(peak > arguments.limit for peak, _ in peaks) else 0
+        costs.append((*cost(arguments.folder, command), source))
+    for peak, seconds, source in sorted(costs, reverse=True):
+        print(f"{peak:5} MB  {seconds:6.1f} s  {os.path.relpath(os.path.join(arguments.folder, source))}")
+    print(f"{len(costs)} sources, {sum(seconds for _, seconds, _ in costs):.0f} s")
+    return 1 if any(peak > arguments.limit for peak, *_ in costs) else 0
 
 
 if __name__ == "__main__":
