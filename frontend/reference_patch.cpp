@@ -17,7 +17,8 @@ constexpr float kMaxUnsettled = 0.1F;  // [px] a last step this long is still a 
 // What further steps may still move the estimate by, squared, against its covariance. The estimate's own error is 6 in
 // the mean, one for each parameter.
 constexpr float kMaxLeft = 0.5F;
-constexpr float kUsualRate = 0.5F;  // of a step to the one before, where there is none
+constexpr float kNearlySettled = 0.05F;  // [px] only after such a step: what does not fit the patch passes for noise
+constexpr float kUsualRate = 0.5F;       // of a step to the one before, where there is none
 constexpr float kMaxRate = 0.9F;
 constexpr float kMinScale = 0.3F;    // of steps that overshoot
 constexpr float kMaxStretch = 2.5F;  // of the affine map: beyond, the patch is no longer what it was
@@ -63,7 +64,7 @@ std::optional<PatchLevel::Step> settle(int max_steps, float short_enough, DoStep
       if (ratio < 0.0F) scale = std::max(scale / (1.0F - ratio), kMinScale);
     }
     const float length2 = step->moved.squaredNorm();
-    const bool lost_in_noise = length2 < kMaxUnsettled * kMaxUnsettled && left_after(*step, last) < kMaxLeft;
+    const bool lost_in_noise = length2 < kNearlySettled * kNearlySettled && left_after(*step, last) < kMaxLeft;
     last = step;
     if (length2 < short_enough * short_enough || lost_in_noise) break;
   }
