@@ -1,13 +1,12 @@
 #include "frontend/flow_check.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 #include <optional>
 
 #include "frontend/essential_matrix.h"
+#include "frontend/motion_of_flows.h"
 
 namespace ear {
 namespace {
@@ -23,8 +22,6 @@ constexpr double kSettled = 0.03;  // times the tolerance: a step that moves no 
 constexpr double kStill = 0.5;     // times the tolerance: a smaller flow is none
 constexpr double kMoved = 3.0;     // times the tolerance: so far off the known motion is more than its error
 
-using Vector6d = Eigen::Matrix<double, 6, 1>;
-using Matrix6d = Eigen::Matrix<double, 6, 6>;
 using Flags = std::vector<std::uint8_t>;
 
 std::size_t count(const Flags& flags) {
@@ -74,78 +71,6 @@ struct Problem {
     });
   }
 };
-
-// Gauss-Newton over rotation and translation, on the given flows with depth; until a step moves no flow by more than
-// `settled` of normalized coordinates.
-std::optional<Transfer> refine(const std::vector<Flow>& flows, const Flags& used, Transfer motion, int steps,
-                               double settled) {
-  double nearest = 0.0;  // inverse depth
-  for (int step = 0; step < steps; ++step) {
-    Matrix6d information = Matrix6d::Zero();
-    Vector6d gradient = Vector6d::Zero();
-    for (std::size_t i = 0; i < flows.size(); ++i) {
-      const Flow& flow = flows[i];
-      if (!used[i] || !flow.has_depth) continue;
-      nearest = std::max(nearest, flow.inverse_depth0);
-      const Eigen::Vector3d point = motion.scaled_point(flow.x0, flow.inverse_depth0);
-      if (!(point.z() > 1e-3)) continue;
-      const double inverse_z = 1.0 / point.z();
-      const Eigen::Vector2d at = point.head<2>() * inverse_z;
-      Eigen::Matrix<double, 2, 3> J_at_point;
-      J_at_point << inverse_z, 0.0, -at.x() * inverse_z, 0.0, inverse_z, -at.y() * inverse_z;
-      const Eigen::Vector3d turned = point - flow.inverse_depth0 * motion.p_10;
-      Eigen::Matrix3d minus_skew;
-      minus_skew << 0.0, turned.z(), -turned.y(), -turned.z(), 0.0, turned.x(), turned.y(), -turned.x(), 0.0;
-      Eigen::Matrix<double, 2, 6> J;
-      J << J_at_point * minus_skew, flow.inverse_depth0 * J_at_point;
-      const Eigen::Vector2d error = flow.x1 - at;
-      information.noalias() += J.transpose() * J;
-      gradient.noalias() += J.transpose() * error;
-    }
-    information.diagonal().array() += 1e-9;
-    const Vector6d change = information.ldlt().solve(gradient);
-    if (!change.allFinite()) return std::nullopt;
-    const double angle = change.head<3>().norm();
-    if (angle > 1e-12) {
-      motion.R_10 = Eigen::AngleAxisd(angle, change.head<3>() / angle).toRotationMatrix() * motion.R_10;
-    }
-    motion.p_10 += change.tail<3>();
-    // What is left after a step is of the order of its square. No flow moves further than the angle and the translation
-    // in units of its depth.
-    if (angle + nearest * change.tail<3>().norm() < settled) break;
-  }
-  return motion;
-}
-
-// Translation from flows with depth and a known rotation: linear, two equations each.
-std::optional<Eigen::Vector3d> solve_translation(const std::vector<Flow>& flows, std::size_t a, std::size_t b,
-                                                 const Eigen::Matrix3d& R_10) {
-  Eigen::Matrix3d information = 1e-9 * Eigen::Matrix3d::Identity();
-  Eigen::Vector3d right = Eigen::Vector3d::Zero();
-  for (const std::size_t i : {a, b}) {
-    const Flow& flow = flows[i];
-    const Eigen::Vector3d far = R_10 * flow.x0.homogeneous();
-    Eigen::Matrix<double, 2, 3> J;
-    J << 1.0, 0.0, -flow.x1.x(), 0.0, 1.0, -flow.x1.y();
-    information.noalias() += flow.inverse_depth0 * flow.inverse_depth0 * J.transpose() * J;
-    right.noalias() -= flow.inverse_depth0 * J.transpose() * (J * far);
-  }
-  const Eigen::Vector3d p = information.ldlt().solve(right);
-  if (!p.allFinite()) return std::nullopt;
-  return p;
-}
-
-// Direction of the translation from two flows without depth and a known rotation.
-std::optional<Eigen::Vector3d> solve_direction(const std::vector<Flow>& flows, std::size_t a, std::size_t b,
-                                               const Eigen::Matrix3d& R_10) {
-  const auto plane_normal = [&](const Flow& flow) -> Eigen::Vector3d {
-    return flow.x1.homogeneous().cross(R_10 * flow.x0.homogeneous());
-  };
-  const Eigen::Vector3d p = plane_normal(flows[a]).cross(plane_normal(flows[b]));
-  const double length = p.norm();
-  if (!(length > 1e-12)) return std::nullopt;
-  return p / length;
-}
 
 // Distinct random members of `from`.
 template <std::size_t n>
@@ -268,12 +193,12 @@ void FlowCheck::find_into(const std::vector<Flow>& flows, const MotionGuess& gue
         [&](const std::array<std::size_t, 3>& s) -> std::optional<Transfer> {
           used_.assign(flows.size(), 0);
           for (const std::size_t i : s) used_[i] = 1;
-          return refine(flows, used_, guess.motion, 5, settled);
+          return refine_motion(flows, used_, guess.motion, 5, settled);
         },
         best, trial_);
   }
   // Gyroscope and prediction are not perfect: let the inliers correct them, then decide.
-  const std::optional<Transfer> refined = refine(flows, best.flags, best.motion, kRefinements, settled);
+  const std::optional<Transfer> refined = refine_motion(flows, best.flags, best.motion, kRefinements, settled);
   if (refined) {
     problem.classify(*refined, trial_);
     const std::size_t inliers = count(trial_);

@@ -45,7 +45,7 @@ TEST_CASE("fast: the corners and scores are those of OpenCV, by every variant of
       pyramid.build(view_of(image));
       FastCorners fast;
       for (const PixelArea& area : areas) {
-        for (const int threshold : {7, 20, 1}) {
+        for (const int threshold : {7, 20, 1, 140}) {
           CAPTURE(threshold);
           fast.find(pyramid, area, threshold);
           Found found;
