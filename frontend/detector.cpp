@@ -1,17 +1,17 @@
 #include "frontend/detector.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 namespace ear {
 namespace {
 
-constexpr int kMargin = 10;                       // [px] from the image's edge: the patch and a bit
-constexpr std::array<int, 2> kThresholds{20, 7};  // grey steps of FAST, tried in this order
-constexpr std::size_t kCandidates = 5;            // of one cell, ranked by FAST's score, that are looked at closely
-constexpr float kMinStrength = 1000.0F;           // [grey^2] 3 grey values of noise then move a patch by 0.15 px
-constexpr float kNoiseGrowth = 1.36F;             // wider_than_noise(): noise exceeds it with probability 1e-4
+constexpr int kMargin = 10;     // [px] from the image's edge: the patch and a bit
+constexpr int kGoodScore = 20;  // grey steps of FAST: lower ones count where there is none of these
+constexpr int kMinScore = 7;
+constexpr std::size_t kCandidates = 5;   // of one cell, ranked by FAST's score, that are looked at closely
+constexpr float kMinStrength = 1000.0F;  // [grey^2] 3 grey values of noise then move a patch by 0.15 px
+constexpr float kNoiseGrowth = 1.36F;    // wider_than_noise(): noise exceeds it with probability 1e-4
 constexpr int kMaxPerCell = 3;
 constexpr int kReach = 7;  // [px] of the surrounding that is looked at: 15x15 pixels
 
@@ -107,25 +107,19 @@ PixelArea Detector::area_of(std::size_t cell) const {
 std::optional<Corner> Detector::best_in_cell(const ImagePyramid& pyramid, std::size_t cell) {
   const PixelArea area = area_of(cell);
   if (area.width <= 0 || area.height <= 0) return std::nullopt;
-  fast_.find(pyramid, area, kThresholds.back());
-  for (const int threshold : kThresholds) {
-    const std::optional<Corner> best = best_of(pyramid, threshold);
-    if (best) return best;
-  }
-  return std::nullopt;
-}
-
-std::optional<Corner> Detector::best_of(const ImagePyramid& pyramid, int threshold) const {
+  fast_.find(pyramid, area, kMinScore);
   Corner best;
-  std::size_t candidates = 0;
-  for (const FastCorner& corner : fast_.strongest_first()) {
-    if (corner.score < threshold || candidates == kCandidates) break;
-    if (!far_from_all(patch_centre(corner), occupied_, min_distance_)) continue;
+  int best_score = 0;
+  for (std::size_t candidates = 0; candidates < kCandidates;) {
+    const std::optional<FastCorner> corner = fast_.take_strongest();
+    if (!corner || (corner->score < kGoodScore && best_score >= kGoodScore)) break;
+    if (!far_from_all(patch_centre(*corner), occupied_, min_distance_)) continue;
     ++candidates;
-    const float strength = corner_strength(pyramid.level(0), corner.u, corner.v);
+    const float strength = corner_strength(pyramid.level(0), corner->u, corner->v);
     if (strength < kMinStrength || strength <= best.strength) continue;
-    if (!wider_than_noise(pyramid.level(0), corner.u, corner.v)) continue;
-    best = {patch_centre(corner), strength};
+    if (!wider_than_noise(pyramid.level(0), corner->u, corner->v)) continue;
+    best = {patch_centre(*corner), strength};
+    best_score = corner->score;
   }
   return best.strength > 0.0F ? std::optional<Corner>(best) : std::nullopt;
 }

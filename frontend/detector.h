@@ -31,7 +31,6 @@ class Detector {
   void count_per_cell(const std::vector<Eigen::Vector2f>& pixels);
   [[nodiscard]] PixelArea area_of(std::size_t cell) const;
   [[nodiscard]] std::optional<Corner> best_in_cell(const ImagePyramid& pyramid, std::size_t cell);
-  [[nodiscard]] std::optional<Corner> best_of(const ImagePyramid& pyramid, int threshold) const;
 
   int width_;
   int height_;

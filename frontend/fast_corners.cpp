@@ -25,9 +25,10 @@ bool any_reaches(const std::uint8_t* scores, int threshold) {
   return ((lower | word) & (0x80 * kOnes)) != 0;
 }
 
-bool stronger(const FastCorner& a, const FastCorner& b) {
-  if (a.score != b.score) return a.score > b.score;
-  return a.v != b.v ? a.v < b.v : a.u < b.u;
+// Of equal ones the lower right one.
+bool weaker(const FastCorner& a, const FastCorner& b) {
+  if (a.score != b.score) return a.score < b.score;
+  return a.v != b.v ? a.v > b.v : a.u > b.u;
 }
 
 }  // namespace
@@ -55,7 +56,15 @@ void FastCorners::find(const ImagePyramid& pyramid, const PixelArea& area, int t
       }
     }
   }
-  std::sort(found_.begin(), found_.end(), stronger);
+  std::make_heap(found_.begin(), found_.end(), weaker);
+}
+
+std::optional<FastCorner> FastCorners::take_strongest() {
+  if (found_.empty()) return std::nullopt;
+  std::pop_heap(found_.begin(), found_.end(), weaker);
+  const FastCorner strongest = found_.back();
+  found_.pop_back();
+  return strongest;
 }
 
 }  // namespace ear

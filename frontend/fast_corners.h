@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "frontend/image_pyramid.h"
@@ -25,12 +26,13 @@ class FastCorners {
   /// for no memory once it has seen as large an area.
   void find(const ImagePyramid& pyramid, const PixelArea& area, int threshold);
 
-  /// Found by the last call; of equal ones the upper left one first.
-  [[nodiscard]] const std::vector<FastCorner>& strongest_first() const { return found_; }
+  /// Of those that the last call found and nobody has taken yet; of equal ones the upper left one. Few are wanted of
+  /// many: they are not sorted.
+  [[nodiscard]] std::optional<FastCorner> take_strongest();
 
  private:
   std::vector<std::uint8_t> scores_;  // of the area, with zeros around
-  std::vector<FastCorner> found_;
+  std::vector<FastCorner> found_;     // a heap
 };
 
 }  // namespace ear

@@ -49,7 +49,7 @@ TEST_CASE("fast: the corners and scores are those of OpenCV, by every variant of
           CAPTURE(threshold);
           fast.find(pyramid, area, threshold);
           Found found;
-          for (const FastCorner& corner : fast.strongest_first()) found.emplace_back(-corner.score, corner.v, corner.u);
+          while (const auto corner = fast.take_strongest()) found.emplace_back(-corner->score, corner->v, corner->u);
           CHECK(std::is_sorted(found.begin(), found.end()));
           CHECK(found == opencv_corners(image, area, threshold));
           count += found.size();
