@@ -150,7 +150,7 @@ TEST_CASE("calibrate: errors that last as long as a track are told from the resi
   const simulator::Simulation simulation(options);
   const Calibration& given = simulation.calibration();
   const Priors priors = drawn_priors(5.0);
-  Drive drive = recorded_drive(simulation, given);
+  Drive drive = recorded_drive(simulation);
   // Half of the tracks drift: a walk of 0.1 px from frame to frame, the same in both cameras.
   std::mt19937_64 rng{5};
   std::normal_distribution<double> step(0.0, 0.1 / given.cameras[0].fu);

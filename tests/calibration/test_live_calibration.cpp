@@ -69,7 +69,7 @@ Made drive_of(double seconds) {
   options.camera_rate_hz = 20.0;
   options.calibration_error = 1.0;
   const simulator::Simulation simulation(options);
-  return {recorded_drive(simulation, simulation.calibration()), simulation.calibration()};
+  return {recorded_drive(simulation), simulation.calibration()};
 }
 
 }  // namespace

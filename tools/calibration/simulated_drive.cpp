@@ -1,24 +1,8 @@
 #include "tools/calibration/simulated_drive.h"
 
-#include "calibration/lens.h"
-#include "frontend/lens.h"
-
 namespace ear::calibration {
 namespace {
 constexpr double kDegree = 3.14159265358979323846 / 180.0;
-
-/// Simulated tracks come without a lens. Here they pass the true one, and the one that was given is taken out.
-void see_through(const Calibration& truth, const Calibration& given, FeatureFrame& frame) {
-  const auto seen = [&](std::size_t camera, const Eigen::Vector2d& ray) {
-    const Eigen::Vector2d pixel = to_pixel<double>(truth.cameras[camera], {}, ray);
-    return Lens(given.cameras[camera]).to_normalized(pixel).value_or(ray);
-  };
-  for (FeatureObservation& feature : frame.features) {
-    feature.left = seen(0, feature.left);
-    if (feature.has_right) feature.right = seen(1, feature.right);
-  }
-}
-
 }  // namespace
 
 Priors drawn_priors(double factor) {
@@ -55,7 +39,7 @@ std::vector<double> errors_left(const Result& result, const Calibration& given, 
   return errors;
 }
 
-Drive recorded_drive(const simulator::Simulation& simulation, const Calibration& given) {
+Drive recorded_drive(const simulator::Simulation& simulation) {
   Drive drive;
   drive.name = simulation.options().sequence;
   drive.imu = simulation.imu();
@@ -63,7 +47,6 @@ Drive recorded_drive(const simulator::Simulation& simulation, const Calibration&
   drive.lasers = simulation.lasers();
   for (std::size_t i = 0; i < simulation.frames().size(); ++i) {
     drive.frames.push_back(simulation.tracks(i));
-    see_through(simulation.true_calibration(), given, drive.frames.back());
   }
   return drive;
 }
@@ -73,7 +56,7 @@ SimulatedCalibration calibrate_simulated(const simulator::Simulation& simulation
   const Priors priors = drawn_priors(factor);
   Calibration given = simulation.calibration();
   given.imu.accel_bias_sigma = 0.08 * std::max(1.0, factor);
-  const std::vector<Drive> drives{recorded_drive(simulation, given)};
+  const std::vector<Drive> drives{recorded_drive(simulation)};
   SimulatedCalibration made;
   made.result = calibrate(given, priors, drives, settings);
   made.errors = errors_left(made.result, given, simulation.true_calibration(), priors);

@@ -20,8 +20,8 @@ struct SimulatedCalibration {
 [[nodiscard]] std::vector<double> errors_left(const Result& result, const Calibration& given, const Calibration& truth,
                                               const Priors& priors);
 
-/// The simulation's samples and tracks, the latter through its true lens and that of `given`.
-[[nodiscard]] Drive recorded_drive(const simulator::Simulation& simulation, const Calibration& given);
+/// The simulation's samples and tracks.
+[[nodiscard]] Drive recorded_drive(const simulator::Simulation& simulation);
 
 /// With the priors that the calibration was drawn from; Options::calibration_error must be stated.
 [[nodiscard]] SimulatedCalibration calibrate_simulated(const simulator::Simulation& simulation,
