@@ -190,7 +190,7 @@ TEST_CASE("clips: noise of the tracks against exact poses") {
     const auto above = std::count_if(values.begin(), values.end(), [&](double v) { return v > limit; });
     return static_cast<double>(above) / static_cast<double>(values.size());
   };
-  CHECK(share_above(temporal_px, 1.0) < 0.02);
+  CHECK(share_above(temporal_px, 1.0) < 0.0025);  // 0.0028 where alignment took what does not fit for noise
   CHECK(share_above(stereo_px, 1.0) < 0.02);
 }
 
