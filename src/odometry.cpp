@@ -89,6 +89,10 @@ class Odometry::Impl {
     };
     if (!learned.cameras.empty()) learned.cameras.front().T_BC = isometry(camera.T_BC0);
     if (learned.cameras.size() == 2) learned.cameras[1].T_BC = isometry(camera.T_BC0) * isometry(camera.T_C0C1);
+    for (std::size_t i = 0; i < learned.cameras.size(); ++i) {
+      learned.cameras[i].fu *= 1.0 + camera.focal_error(static_cast<Eigen::Index>(i));
+      learned.cameras[i].fv *= 1.0 + camera.focal_error(static_cast<Eigen::Index>(i));
+    }
     learned.camera_time_offset = camera.time_offset;
     if (learned.encoder) {
       learned.encoder->wheel_radius = {odometer.wheel_radius(0), odometer.wheel_radius(1)};

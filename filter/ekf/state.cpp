@@ -69,6 +69,7 @@ void boxplus_in_place(State& x, const Eigen::Ref<const Eigen::VectorXd>& d) {
   x.odometer.T_BO.p += d.segment<3>(err::axle);
   apply_local(x.camera.T_BC0, d.segment<3>(err::camera), d.segment<3>(err::camera + 3));
   apply_local(x.camera.T_C0C1, d.segment<3>(err::stereo), d.segment<3>(err::stereo + 3));
+  x.camera.focal_error += d.segment<2>(err::focal);
   x.camera.time_offset += d(err::time_offset);
   for (std::size_t i = 0; i < x.clones.size(); ++i) {
     const int at = err::clone(static_cast<int>(i));
@@ -100,6 +101,7 @@ Eigen::VectorXd boxminus(const State& truth, const State& estimate) {
   d.segment<kMaxBeams>(err::beams) = truth.odometer.beam_offset - estimate.odometer.beam_offset;
   d.segment<6>(err::camera) = local_difference(truth.camera.T_BC0, estimate.camera.T_BC0);
   d.segment<6>(err::stereo) = local_difference(truth.camera.T_C0C1, estimate.camera.T_C0C1);
+  d.segment<2>(err::focal) = truth.camera.focal_error - estimate.camera.focal_error;
   d(err::time_offset) = truth.camera.time_offset - estimate.camera.time_offset;
   for (std::size_t i = 0; i < estimate.clones.size(); ++i) {
     d.segment<6>(err::clone(static_cast<int>(i))) = invariant_difference(truth.clones[i].T_WB, estimate.clones[i].T_WB);

@@ -207,11 +207,11 @@ Eigen::VectorXd Start::sigma() const {
     sigma.segment<3>(err::camera + 3).setConstant(prior.camera_position);
     if (calibration_.cameras.size() == 2) {
       sigma.segment<3>(err::stereo).setConstant(prior.stereo_rotation);
-      // The state has no lens: a wrong focal length makes depths wrong as a wrong baseline does.
-      const Eigen::Array3d by_lens = prior.focal_length * camera_state(calibration_).T_C0C1.p;
-      sigma.segment<3>(err::stereo + 3) = (by_lens.square() + prior.stereo_position * prior.stereo_position).sqrt();
+      sigma.segment<3>(err::stereo + 3).setConstant(prior.stereo_position);
     }
   }
+  const auto cameras = static_cast<Eigen::Index>(calibration_.cameras.size());
+  if (online.focal_length) sigma.segment(err::focal, cameras).setConstant(prior.focal_length);
   if (online.time_offset && !calibration_.cameras.empty()) sigma(err::time_offset) = prior.time_offset;
   if (uses_wheels()) {
     const auto beams = calibration_.lasers ? static_cast<Eigen::Index>(calibration_.lasers->beams.size()) : 0;

@@ -94,6 +94,7 @@ EnableFor<C, StandstillConfig> visit(C& c, F&& f) {
 template <typename C, typename F>
 EnableFor<C, OnlineCalibrationConfig> visit(C& c, F&& f) {
   f("camera_extrinsics", c.camera_extrinsics);
+  f("focal_length", c.focal_length);
   f("time_offset", c.time_offset);
   f("wheels", c.wheels);
   f("odometer_rotation", c.odometer_rotation);

@@ -9,7 +9,7 @@
 namespace ear {
 namespace {
 
-constexpr int kCalibration = 12;  // columns of the cameras' poses; the time offset acts through the clones
+constexpr int kCalibration = 14;  // columns of poses and focal lengths; the time offset acts through the clones
 
 /// First column of a clone, counted from err::camera.
 constexpr int clone_column(int clone) { return err::clone(clone) - err::camera; }
@@ -69,11 +69,13 @@ LinearizedObservation linearize_observation(const Pose& T_WB, const CameraState&
   const Eigen::Vector3d from_C1_C0 = f_C0 - s * T_C0C1.p;
   const Eigen::Vector3d h = camera == 0 ? f_C0 : Eigen::Vector3d(T_C0C1.R.transpose() * from_C1_C0);
 
-  const double w = 1.0 / h.z();
+  const Eigen::Vector2d projected = h.hnormalized();
+  const double focal = 1.0 + cameras.focal_error(camera);
+  const double w = focal / h.z();
   LinearizedObservation z;
-  z.residual = uv - h.head<2>() * w;
+  z.residual = uv - focal * projected;
   Eigen::Matrix<double, 2, 3> J_C;  // d uv / d h
-  J_C << w, 0.0, -h.x() * w * w, 0.0, w, -h.y() * w * w;
+  J_C << w, 0.0, -w * projected.x(), 0.0, w, -w * projected.y();
   const Eigen::Matrix<double, 2, 3> J_C0 = camera == 0 ? J_C : Eigen::Matrix<double, 2, 3>(J_C * T_C0C1.R.transpose());
   const Eigen::Matrix<double, 2, 3> J_B = J_C0 * R_C0B;
   const Eigen::Matrix<double, 2, 3> J_W = J_B * T_WB.R.transpose();
@@ -85,11 +87,13 @@ LinearizedObservation linearize_observation(const Pose& T_WB, const CameraState&
   z.H_calibration.leftCols<3>() = J_B * skew(from_C0_B);
   z.H_calibration.middleCols<3>(3) = -s * J_B;
   if (camera == 0) {
-    z.H_calibration.rightCols<6>().setZero();
+    z.H_calibration.middleCols<6>(6).setZero();
   } else {
     z.H_calibration.middleCols<3>(6) = J_C0 * skew(from_C1_C0);
-    z.H_calibration.rightCols<3>() = -s * J_C0;
+    z.H_calibration.middleCols<3>(9) = -s * J_C0;
   }
+  z.H_calibration.rightCols<2>().setZero();
+  z.H_calibration.col(12 + camera) = projected;
   return z;
 }
 
