@@ -152,7 +152,6 @@ bool Ekf::possible() const {
   const bool finite = std::abs(state_.camera.time_offset) <= kLargestTimeOffset && x.R_WB.allFinite() &&
                       x.p_WB.allFinite() && x.v_W.allFinite() && x.b_g.allFinite() && x.b_a.allFinite() &&
                       state_.camera.T_BC0.R.allFinite() && state_.camera.T_BC0.p.allFinite() &&
-                      state_.camera.focal_error.allFinite() &&
                       o.wheel_radius.allFinite() && std::isfinite(o.track_width) && o.T_BO.R.allFinite() &&
                       o.T_BO.p.allFinite() && o.beam_offset.allFinite() && state_.ground.n_W.allFinite() &&
                       std::isfinite(P.sum());  // one that is not makes the sum so

@@ -31,9 +31,10 @@ inline constexpr int axle = odometer + 3;         ///< position of O in the body
 inline constexpr int beams = axle + 3;            ///< offset of each laser beam's range [m]
 inline constexpr int camera = beams + kMaxBeams;  ///< phi, p of camera 0 in the body: 6
 inline constexpr int stereo = camera + 6;         ///< phi, p of camera 1 in camera 0: 6
-inline constexpr int focal = stereo + 6;          ///< focal length of cameras 0 and 1, relative: 2
-inline constexpr int time_offset = focal + 2;     ///< [s]
-inline constexpr int calibration_size = 15;
+inline constexpr int lens = stereo + 6;           ///< focal length and principal point of cameras 0 and 1: 3 each
+inline constexpr int lens_size = 3;
+inline constexpr int time_offset = lens + 2 * lens_size;  ///< [s]
+inline constexpr int calibration_size = 19;
 inline constexpr int clones = camera + calibration_size;
 inline constexpr int clone_size = 6;  ///< theta, rho
 [[nodiscard]] constexpr int clone(int index) { return clones + clone_size * index; }
@@ -73,13 +74,26 @@ struct OdometerState {
       Eigen::Matrix<double, kMaxBeams, 1>::Zero();  ///< of the laser beams: measured less true range [m]
 };
 
+/// What the intrinsics with which features were normalized are wrong by: what is at x is measured at
+/// (1 + focal_length) x + principal_point.
+struct LensError {
+  double focal_length = 0.0;                                  ///< true less given, relative
+  Eigen::Vector2d principal_point = Eigen::Vector2d::Zero();  ///< true less given, over the focal length
+
+  [[nodiscard]] Eigen::Vector2d measured(const Eigen::Vector2d& uv) const {
+    return (1.0 + focal_length) * uv + principal_point;
+  }
+  [[nodiscard]] Eigen::Vector2d corrected(const Eigen::Vector2d& measured) const {
+    return (measured - principal_point) / (1.0 + focal_length);
+  }
+};
+
 /// The cameras as the filter knows them.
 struct CameraState {
   Pose T_BC0;                ///< camera 0 to body
   Pose T_C0C1;               ///< camera 1 to camera 0
   double time_offset = 0.0;  ///< [s] add to a camera stamp to get IMU time
-  /// Of cameras 0 and 1: the true focal length is 1 + this times the one that features were normalized with.
-  Eigen::Vector2d focal_error = Eigen::Vector2d::Zero();
+  std::array<LensError, 2> lens_error;
 };
 
 /// A camera's stamp by the clock of the IMU, and the reverse.

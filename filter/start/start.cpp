@@ -210,8 +210,11 @@ Eigen::VectorXd Start::sigma() const {
       sigma.segment<3>(err::stereo + 3).setConstant(prior.stereo_position);
     }
   }
-  const auto cameras = static_cast<Eigen::Index>(calibration_.cameras.size());
-  if (online.focal_length) sigma.segment(err::focal, cameras).setConstant(prior.focal_length);
+  for (std::size_t i = 0; online.intrinsics && i < calibration_.cameras.size(); ++i) {
+    const CameraCalibration& camera = calibration_.cameras[i];
+    sigma.segment<err::lens_size>(err::lens + err::lens_size * static_cast<int>(i))
+        << prior.focal_length, prior.principal_point / camera.fu, prior.principal_point / camera.fv;
+  }
   if (online.time_offset && !calibration_.cameras.empty()) sigma(err::time_offset) = prior.time_offset;
   if (uses_wheels()) {
     const auto beams = calibration_.lasers ? static_cast<Eigen::Index>(calibration_.lasers->beams.size()) : 0;

@@ -9,7 +9,8 @@
 namespace ear {
 namespace {
 
-constexpr int kCalibration = 14;  // columns of poses and focal lengths; the time offset acts through the clones
+// Columns of the cameras' poses and lenses; the time offset acts through the clones.
+constexpr int kCalibration = err::time_offset - err::camera;
 
 /// First column of a clone, counted from err::camera.
 constexpr int clone_column(int clone) { return err::clone(clone) - err::camera; }
@@ -70,10 +71,10 @@ LinearizedObservation linearize_observation(const Pose& T_WB, const CameraState&
   const Eigen::Vector3d h = camera == 0 ? f_C0 : Eigen::Vector3d(T_C0C1.R.transpose() * from_C1_C0);
 
   const Eigen::Vector2d projected = h.hnormalized();
-  const double focal = 1.0 + cameras.focal_error(camera);
-  const double w = focal / h.z();
+  const LensError& lens = cameras.lens_error[static_cast<std::size_t>(camera)];
+  const double w = (1.0 + lens.focal_length) / h.z();
   LinearizedObservation z;
-  z.residual = uv - focal * projected;
+  z.residual = uv - lens.measured(projected);
   Eigen::Matrix<double, 2, 3> J_C;  // d uv / d h
   J_C << w, 0.0, -w * projected.x(), 0.0, w, -w * projected.y();
   const Eigen::Matrix<double, 2, 3> J_C0 = camera == 0 ? J_C : Eigen::Matrix<double, 2, 3>(J_C * T_C0C1.R.transpose());
@@ -92,8 +93,9 @@ LinearizedObservation linearize_observation(const Pose& T_WB, const CameraState&
     z.H_calibration.middleCols<3>(6) = J_C0 * skew(from_C1_C0);
     z.H_calibration.middleCols<3>(9) = -s * J_C0;
   }
-  z.H_calibration.rightCols<2>().setZero();
-  z.H_calibration.col(12 + camera) = projected;
+  z.H_calibration.rightCols<2 * err::lens_size>().setZero();
+  z.H_calibration.middleCols<err::lens_size>(err::lens - err::camera + err::lens_size * camera)
+      << projected, Eigen::Matrix2d::Identity();
   return z;
 }
 

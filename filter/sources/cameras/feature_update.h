@@ -23,8 +23,8 @@ struct CameraPose {
 struct LinearizedObservation {
   int clone = 0;
   Eigen::Vector2d residual;                    ///< measured - predicted, normalized coordinates
-  /// phi, p of camera 0 in B; phi, p of camera 1 in camera 0; focal lengths.
-  Eigen::Matrix<double, 2, 14> H_calibration;
+  /// phi, p of camera 0 in B; phi, p of camera 1 in camera 0; lenses of both.
+  Eigen::Matrix<double, 2, err::time_offset - err::camera> H_calibration;
   Eigen::Matrix<double, 2, err::clone_size> H_clone;
   Eigen::Matrix<double, 2, 3> H_f;  ///< feature times its inverse depth, world axes
   double noise = 1.0;               ///< its standard deviation, times that of all observations
