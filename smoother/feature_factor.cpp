@@ -37,10 +37,11 @@ Prediction predict(const Observation& seen, const InverseDepthPoint& anchor, int
   const Eigen::Matrix<double, 2, 3> by_theta = z.H_clone.leftCols<3>() / seen.sigma + by_p * skew(p_WS);
   const Eigen::Vector3d v_W = T_WB.R * seen.v_B;
   result.J_pose << by_theta - by_p * skew(v_W) * late, by_p;
-  result.J_imaging << z.H_calibration.rightCols<2 * err::lens_size>() / seen.sigma,
-      by_theta * (T_WB.R * seen.rate_B) + by_p * v_W;
-  result.J_camera = z.H_calibration.leftCols<6>() / seen.sigma;
-  result.J_stereo = z.H_calibration.middleCols<6>(6) / seen.sigma;
+  result.J_imaging.setZero();
+  result.J_imaging.middleCols<err::lens_size>(imaging_entry::lens + err::lens_size * which) = z.H_lens / seen.sigma;
+  result.J_imaging.col(imaging_entry::time_offset) = by_theta * (T_WB.R * seen.rate_B) + by_p * v_W;
+  result.J_camera = z.H_poses.leftCols<6>() / seen.sigma;
+  result.J_stereo = z.H_poses.rightCols<6>() / seen.sigma;
   const Eigen::Vector3d lever_C0 = which == 0 ? Eigen::Vector3d::Zero().eval() : cameras.T_C0C1.p;
   const Eigen::Vector3d p_WC = p_WS + R_WS * (cameras.T_BC0.p + cameras.T_BC0.R * lever_C0);
   Eigen::Matrix3d by_point;  // of what the camera sees, times the inverse depth

@@ -95,7 +95,7 @@ std::vector<int> filter_entries() {
   take(err::b_g, 6);
   take(err::camera, 6);
   take(err::stereo, 6);
-  take(err::lens, 2 * err::lens_size);
+  take(err::lenses, 2 * err::lens_size);
   take(err::time_offset, 1);
   take(err::wheel_radius, 2);
   take(err::track_width, 1);

@@ -212,8 +212,8 @@ Eigen::VectorXd Start::sigma() const {
   }
   for (std::size_t i = 0; online.intrinsics && i < calibration_.cameras.size(); ++i) {
     const CameraCalibration& camera = calibration_.cameras[i];
-    sigma.segment<err::lens_size>(err::lens + err::lens_size * static_cast<int>(i))
-        << prior.focal_length, prior.principal_point / camera.fu, prior.principal_point / camera.fv;
+    sigma.segment<err::lens_size>(err::lens(static_cast<int>(i))) << prior.focal_length,
+        prior.principal_point / camera.fu, prior.principal_point / camera.fv;
   }
   if (online.time_offset && !calibration_.cameras.empty()) sigma(err::time_offset) = prior.time_offset;
   if (uses_wheels()) {

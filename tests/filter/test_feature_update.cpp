@@ -20,7 +20,6 @@ namespace {
 const Gate kOpen(std::vector<double>{1e9});
 
 constexpr double kSigma = 1e-3;
-constexpr int kCalibration = err::time_offset - err::camera;
 
 /// A point seen by both cameras of all clones, with noise; the point is triangulated, as the filter does it.
 struct Scene {
@@ -63,8 +62,7 @@ void see(std::mt19937_64& rng, const Eigen::Vector3d& f_W, int first, double out
   REQUIRE(point);
   scene.point = *point;
   for (std::size_t k = 0; k < who.size(); ++k) {
-    scene.observations.push_back(
-        linearize_observation(scene.x, who[k].first, who[k].second, scene.point, seen[k]));
+    scene.observations.push_back(linearize_observation(scene.x, who[k].first, who[k].second, scene.point, seen[k]));
   }
 }
 
@@ -109,7 +107,8 @@ void stack(const Scene& scene, Eigen::MatrixXd& H_x, Eigen::MatrixXd& H_f, Eigen
   for (std::size_t k = 0; k < scene.observations.size(); ++k) {
     const LinearizedObservation& z = scene.observations[k];
     const auto row = static_cast<Eigen::Index>(2 * k);
-    H_x.block<2, kCalibration>(row, err::camera) = z.H_calibration / kSigma;
+    H_x.block<2, err::poses_size>(row, err::camera) = z.H_poses / kSigma;
+    H_x.block<2, err::lens_size>(row, err::lens(z.camera)) = z.H_lens / kSigma;
     H_x.block<2, 6>(row, err::clone(z.clone)) = z.H_clone / kSigma;
     H_f.middleRows<2>(row) = z.H_f / kSigma;
     r.segment<2>(row) = z.residual / kSigma;
@@ -151,7 +150,8 @@ TEST_CASE("feature: H is the derivative of the observation, for both cameras, ca
       const Eigen::Vector3d f_W = scene.point.scaled_W() / scene.point.inverse_depth;
       const LinearizedObservation z = linearize_observation(scene.x, 1, camera, scene.point, Eigen::Vector2d::Zero());
       Eigen::MatrixXd H = Eigen::MatrixXd::Zero(2, scene.x.error_size());
-      H.block<2, kCalibration>(0, err::camera) = z.H_calibration;
+      H.block<2, err::poses_size>(0, err::camera) = z.H_poses;
+      H.block<2, err::lens_size>(0, err::lens(camera)) = z.H_lens;
       H.block<2, 6>(0, err::clone(1)) = z.H_clone;
       check_jacobian(
           [&](const Eigen::VectorXd& d) -> Eigen::VectorXd { return project(boxplus(scene.x, d), 1, camera, f_W); }, H);
@@ -225,7 +225,9 @@ TEST_CASE("feature: rows left out as negligible take no more than their share, a
   const Eigen::MatrixXd missing = all.transpose() * all - most.transpose() * most;
   Eigen::VectorXd known = Eigen::VectorXd::Zero(missing.rows());  // what the features tell, were they known
   for (const LinearizedObservation& z : scene.observations) {
-    known.head<kCalibration>() += z.H_calibration.cwiseAbs2().colwise().sum().transpose() / (kSigma * kSigma);
+    known.head<err::poses_size>() += z.H_poses.cwiseAbs2().colwise().sum().transpose() / (kSigma * kSigma);
+    known.segment<err::lens_size>(err::lens(z.camera) - err::camera) +=
+        z.H_lens.cwiseAbs2().colwise().sum().transpose() / (kSigma * kSigma);
     known.segment<6>(err::clone(z.clone) - err::camera) +=
         z.H_clone.cwiseAbs2().colwise().sum().transpose() / (kSigma * kSigma);
   }

@@ -77,9 +77,8 @@ TEST_CASE("factors: a feature where it is seen leaves nothing; seen later, it mo
   ahead.inverse_depth = 0.5;
   const Eigen::VectorXd camera = block({ahead.R_WA, Eigen::Vector3d::Zero()});
   const Eigen::VectorXd r = residual(
-      LeftFactor(seen, ahead),
-      {block(Pose{}), camera, 0.01 * Eigen::VectorXd::Unit(7, imaging_entry::time_offset),
-       Eigen::Vector3d(0.0, 0.0, ahead.inverse_depth)});
+      LeftFactor(seen, ahead), {block(Pose{}), camera, 0.01 * Eigen::VectorXd::Unit(7, imaging_entry::time_offset),
+                                Eigen::Vector3d(0.0, 0.0, ahead.inverse_depth)});
   CHECK(r(0) == doctest::Approx(-5e-3));
   CHECK(std::abs(r(1)) < 1e-12);
 }

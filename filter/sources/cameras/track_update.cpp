@@ -84,7 +84,8 @@ bool TrackUpdate::add(const Track& track, const Ekf& ekf) {
   sightings_.clear();
   const auto see = [&](int clone, int which, const Eigen::Vector2d& uv) {
     const CameraPose& camera = cameras_[static_cast<std::size_t>(2 * clone + which)];
-    sightings_.push_back({camera.R_CW, camera.p_WC, x.camera.lens_error[static_cast<std::size_t>(which)].corrected(uv)});
+    sightings_.push_back(
+        {camera.R_CW, camera.p_WC, x.camera.lens_error[static_cast<std::size_t>(which)].corrected(uv)});
   };
   for (const TrackObservation& o : track.observations) {
     const int clone = clone_index(x, o.frame);
