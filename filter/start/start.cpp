@@ -207,7 +207,10 @@ Eigen::VectorXd Start::sigma() const {
     sigma.segment<3>(err::camera + 3).setConstant(prior.camera_position);
     if (calibration_.cameras.size() == 2) {
       sigma.segment<3>(err::stereo).setConstant(prior.stereo_rotation);
-      sigma.segment<3>(err::stereo + 3).setConstant(prior.stereo_position);
+      // The baseline scales with the size of the target that the cameras were calibrated with: large rigs are known to
+      // a share of it.
+      const Eigen::Array3d by_target = prior.focal_length * camera_state(calibration_).T_C0C1.p;
+      sigma.segment<3>(err::stereo + 3) = (by_target.square() + prior.stereo_position * prior.stereo_position).sqrt();
     }
   }
   for (std::size_t i = 0; online.intrinsics && i < calibration_.cameras.size(); ++i) {
