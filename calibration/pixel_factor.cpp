@@ -76,8 +76,8 @@ Prediction predict(const PixelObservation& seen, const GivenCameras& given, cons
   const Eigen::Matrix<double, 2, 3> by_theta = D * z.H_clone.leftCols<3>() + by_p * skew(p_WS);
   result.J_pose << by_theta - by_p * skew(v_W) * late, by_p;
   result.J_time = by_theta * (T_WB.R * seen.rate_B) + by_p * v_W;
-  result.J_camera = by_block(D * z.H_calibration.leftCols<6>(), b.camera);
-  if (b.stereo != nullptr) result.J_stereo = by_block(D * z.H_calibration.rightCols<6>(), b.stereo);
+  result.J_camera = by_block(D * z.H_poses.leftCols<6>(), b.camera);
+  if (b.stereo != nullptr) result.J_stereo = by_block(D * z.H_poses.rightCols<6>(), b.stereo);
   const Eigen::Vector3d lever_C0 = which == 0 ? Eigen::Vector3d::Zero().eval() : cameras.T_C0C1.p;
   const Eigen::Vector3d p_WC = p_WS + R_WS * (cameras.T_BC0.p + cameras.T_BC0.R * lever_C0);
   Eigen::Matrix3d by_point;  // of what the camera sees, times the inverse depth

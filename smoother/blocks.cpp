@@ -2,6 +2,21 @@
 
 namespace ear::smoother {
 
+void set_imaging(const double* block, CameraState& cameras) {
+  for (LensError& lens : cameras.lens_error) {
+    lens.focal_length = block[0];
+    lens.principal_point << block[1], block[2];
+    block += err::lens_size;
+  }
+  cameras.time_offset = *block;
+}
+
+ImagingBlock imaging_block(const CameraState& cameras) {
+  const auto& [left, right] = cameras.lens_error;
+  return {left.focal_length,         left.principal_point.x(),  left.principal_point.y(), right.focal_length,
+          right.principal_point.x(), right.principal_point.y(), cameras.time_offset};
+}
+
 bool PoseManifold::Plus(const double* x, const double* step, double* result) const {
   const Eigen::Quaterniond turn(exp_so3(Eigen::Map<const Eigen::Vector3d>(step)));
   const Eigen::Quaterniond q = (turn * Eigen::Map<const Eigen::Quaterniond>(x)).normalized();

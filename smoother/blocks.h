@@ -3,7 +3,7 @@
 //   pose    (7) q_x q_y q_z q_w p_x p_y p_z   step (6): R = Exp(theta) R^, p = p^ + dp; body in the world, camera 0 in
 //                                             the body, camera 1 in camera 0
 //   motion  (9) v_W b_g b_a                   additive
-//   offset  (1) camera stamp to IMU time      additive [s]
+//   imaging (7) of both cameras: focal length and principal point (LensError); camera stamp to IMU time [s]; additive
 //   wheels  (6) relative error of the radii (left, right) and of the track width, turn of the odometer [rad]; of the
 //               calibration that was given    additive
 //   point   (3) alpha, beta, inverse depth    additive; in a camera frame that stays where it is in the world
@@ -20,7 +20,7 @@ namespace ear::smoother {
 
 using PoseBlock = std::array<double, 7>;
 using MotionBlock = std::array<double, 9>;
-using OffsetBlock = std::array<double, 1>;
+using ImagingBlock = std::array<double, 7>;
 using WheelBlock = std::array<double, 6>;
 using PointBlock = std::array<double, 3>;
 
@@ -30,6 +30,9 @@ inline constexpr int kMotionStep = 9;
 namespace motion_entry {
 inline constexpr int v = 0, b_g = 3, b_a = 6;
 }
+namespace imaging_entry {
+inline constexpr int lens = 0, time_offset = 6;
+}
 namespace wheel_entry {
 inline constexpr int radius = 0, track_width = 2, turn = 3;
 }
@@ -38,6 +41,10 @@ inline constexpr int radius = 0, track_width = 2, turn = 3;
   return {Eigen::Map<const Eigen::Quaterniond>(block).normalized().toRotationMatrix(),
           Eigen::Map<const Eigen::Vector3d>(block + 4)};
 }
+
+/// The cameras' lenses and time offset; their poses are blocks of their own.
+void set_imaging(const double* block, CameraState& cameras);
+[[nodiscard]] ImagingBlock imaging_block(const CameraState& cameras);
 
 [[nodiscard]] inline PoseBlock to_block(const Pose& pose) {
   PoseBlock block;

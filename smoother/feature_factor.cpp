@@ -10,19 +10,20 @@ namespace {
 struct Prediction {
   Eigen::Vector2d residual;
   Eigen::Matrix<double, 2, 6> J_pose, J_camera, J_stereo;
-  Eigen::Vector2d J_offset;
+  Eigen::Matrix<double, 2, 7> J_imaging;
   Eigen::Matrix<double, 2, 3> J_point;
   bool valid = false;
 };
 
 Prediction predict(const Observation& seen, const InverseDepthPoint& anchor, int which, const double* pose,
-                   const double* camera, const double* stereo, double offset, const double* point) {
+                   const double* camera, const double* stereo, const double* imaging, const double* point) {
   const Pose T_WB = to_pose(pose);
-  const double late = offset - seen.time_offset;  // [s] the frame was taken after the pose's time
+  CameraState cameras;
+  set_imaging(imaging, cameras);
+  const double late = cameras.time_offset - seen.time_offset;  // [s] the frame was taken after the pose's time
   const Eigen::Vector3d turn_B = seen.rate_B * late;
   const Eigen::Matrix3d R_WS = T_WB.R * exp_so3(turn_B);  // S: the body when the frame was taken
   const Eigen::Vector3d p_WS = T_WB.p + T_WB.R * seen.v_B * late;
-  CameraState cameras;
   cameras.T_BC0 = to_pose(camera);
   if (stereo != nullptr) cameras.T_C0C1 = to_pose(stereo);
   const InverseDepthPoint feature = with_values(anchor, point);
@@ -36,9 +37,11 @@ Prediction predict(const Observation& seen, const InverseDepthPoint& anchor, int
   const Eigen::Matrix<double, 2, 3> by_theta = z.H_clone.leftCols<3>() / seen.sigma + by_p * skew(p_WS);
   const Eigen::Vector3d v_W = T_WB.R * seen.v_B;
   result.J_pose << by_theta - by_p * skew(v_W) * late, by_p;
-  result.J_offset = by_theta * (T_WB.R * seen.rate_B) + by_p * v_W;
-  result.J_camera = z.H_calibration.leftCols<6>() / seen.sigma;
-  result.J_stereo = z.H_calibration.rightCols<6>() / seen.sigma;
+  result.J_imaging.setZero();
+  result.J_imaging.middleCols<err::lens_size>(imaging_entry::lens + err::lens_size * which) = z.H_lens / seen.sigma;
+  result.J_imaging.col(imaging_entry::time_offset) = by_theta * (T_WB.R * seen.rate_B) + by_p * v_W;
+  result.J_camera = z.H_poses.leftCols<6>() / seen.sigma;
+  result.J_stereo = z.H_poses.rightCols<6>() / seen.sigma;
   const Eigen::Vector3d lever_C0 = which == 0 ? Eigen::Vector3d::Zero().eval() : cameras.T_C0C1.p;
   const Eigen::Vector3d p_WC = p_WS + R_WS * (cameras.T_BC0.p + cameras.T_BC0.R * lever_C0);
   Eigen::Matrix3d by_point;  // of what the camera sees, times the inverse depth
@@ -60,9 +63,9 @@ bool store_all(const Prediction& z, double* residual, double** jacobians, bool r
   store_pose(jacobians[0], z.J_pose);
   store_pose(jacobians[1], z.J_camera);
   if (right) store_pose(jacobians[2], z.J_stereo);
-  double* const offset = jacobians[right ? 3 : 2];
+  double* const imaging = jacobians[right ? 3 : 2];
   double* const point = jacobians[right ? 4 : 3];
-  if (offset != nullptr) store((-z.J_offset).eval(), offset);
+  if (imaging != nullptr) store((-z.J_imaging).eval(), imaging);
   if (point != nullptr) store((-z.J_point).eval(), point);
   return z.valid;
 }
@@ -81,12 +84,12 @@ PointBlock to_block(const InverseDepthPoint& point) {
 }
 
 bool LeftFactor::Evaluate(double const* const* blocks, double* residual, double** jacobians) const {
-  const Prediction z = predict(seen_, anchor_, 0, blocks[0], blocks[1], nullptr, blocks[2][0], blocks[3]);
+  const Prediction z = predict(seen_, anchor_, 0, blocks[0], blocks[1], nullptr, blocks[2], blocks[3]);
   return store_all(z, residual, jacobians, false);
 }
 
 bool RightFactor::Evaluate(double const* const* blocks, double* residual, double** jacobians) const {
-  const Prediction z = predict(seen_, anchor_, 1, blocks[0], blocks[1], blocks[2], blocks[3][0], blocks[4]);
+  const Prediction z = predict(seen_, anchor_, 1, blocks[0], blocks[1], blocks[2], blocks[3], blocks[4]);
   return store_all(z, residual, jacobians, true);
 }
 

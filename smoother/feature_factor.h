@@ -18,8 +18,8 @@ struct Observation {
   double time_offset = 0.0;                          ///< [s] that the pose's time was computed with
 };
 
-/// Blocks: pose, camera, [stereo,] offset, point; measured less predicted, whitened.
-class LeftFactor final : public ceres::SizedCostFunction<2, 7, 7, 1, 3> {
+/// Blocks: pose, camera, [stereo,] imaging, point; measured less predicted, whitened.
+class LeftFactor final : public ceres::SizedCostFunction<2, 7, 7, 7, 3> {
  public:
   /// `anchor`: the frame of the point block, whose own bearing and depth are not used.
   LeftFactor(const Observation& seen, const InverseDepthPoint& anchor) : seen_(seen), anchor_(anchor) {}
@@ -30,7 +30,7 @@ class LeftFactor final : public ceres::SizedCostFunction<2, 7, 7, 1, 3> {
   InverseDepthPoint anchor_;
 };
 
-class RightFactor final : public ceres::SizedCostFunction<2, 7, 7, 7, 1, 3> {
+class RightFactor final : public ceres::SizedCostFunction<2, 7, 7, 7, 7, 3> {
  public:
   RightFactor(const Observation& seen, const InverseDepthPoint& anchor) : seen_(seen), anchor_(anchor) {}
   bool Evaluate(double const* const* blocks, double* residual, double** jacobians) const override;

@@ -91,7 +91,7 @@ bool Terms::add_point(Unknowns& unknowns, const Track& track) {
   Point& point = points_[track.id];
   CalibrationBlocks& calibration = unknowns.calibration();
   double* const camera = calibration.camera.data();
-  double* const offset = calibration.offset.data();
+  double* const imaging = calibration.imaging.data();
   PointTerm term;
   term.id = track.id;
   term.block = &point.block;
@@ -99,12 +99,12 @@ bool Terms::add_point(Unknowns& unknowns, const Track& track) {
     Unknowns::Frame& frame = unknowns[unknowns.index_of(o.frame)];
     Observation seen{o.left, sigma_ * frame.feature_noise, frame.rate_B, frame.v_B, frame.time_offset};
     term.factors.push_back({std::make_unique<LeftFactor>(seen, point.anchor),
-                            {frame.pose.data(), camera, offset, point.block.data()},
+                            {frame.pose.data(), camera, imaging, point.block.data()},
                             &huber_});
     if (!o.has_right) continue;
     seen.uv = o.right;
     term.factors.push_back({std::make_unique<RightFactor>(seen, point.anchor),
-                            {frame.pose.data(), camera, calibration.stereo.data(), offset, point.block.data()},
+                            {frame.pose.data(), camera, calibration.stereo.data(), imaging, point.block.data()},
                             &huber_});
   }
   point_terms_.push_back(std::move(term));

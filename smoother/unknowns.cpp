@@ -12,7 +12,7 @@ using MotionVector = Eigen::Matrix<double, kMotionStep, 1>;
 Unknowns::Unknowns(const State& x) : given_(x.odometer) {
   calibration_.camera = to_block(x.camera.T_BC0);
   calibration_.stereo = to_block(x.camera.T_C0C1);
-  calibration_.offset = {x.camera.time_offset};
+  calibration_.imaging = imaging_block(x.camera);
   auto first = std::make_unique<Frame>();
   first->number = next_number_++;
   first->t_ns = x.imu.t_ns;
@@ -35,7 +35,7 @@ std::uint64_t Unknowns::append(const NewFrame& given, bool image) {
   frame->since = given.since;
   frame->rate_B = given.rate_B;
   frame->v_B = R_WB.transpose() * v_W;
-  frame->time_offset = calibration_.offset[0];
+  frame->time_offset = calibration_.imaging[imaging_entry::time_offset];
   frame->feature_noise = given.feature_noise;
   frame->image = image;
   frames_.push_back(std::move(frame));
@@ -58,7 +58,11 @@ ImuState Unknowns::newest() const {
 }
 
 CameraState Unknowns::cameras() const {
-  return {to_pose(calibration_.camera.data()), to_pose(calibration_.stereo.data()), calibration_.offset[0]};
+  CameraState cameras;
+  cameras.T_BC0 = to_pose(calibration_.camera.data());
+  cameras.T_C0C1 = to_pose(calibration_.stereo.data());
+  set_imaging(calibration_.imaging.data(), cameras);
+  return cameras;
 }
 
 OdometerState Unknowns::odometer() const { return with_errors(given_, calibration_.wheels.data()); }
@@ -75,7 +79,7 @@ std::vector<PriorBlock> Unknowns::blocks() const {
   }
   add(BlockKind::sensor_pose, calibration_.camera.data(), 7);
   add(BlockKind::sensor_pose, calibration_.stereo.data(), 7);
-  add(BlockKind::additive, calibration_.offset.data(), 1);
+  add(BlockKind::additive, calibration_.imaging.data(), static_cast<int>(calibration_.imaging.size()));
   add(BlockKind::additive, calibration_.wheels.data(), 6);
   return result;
 }
@@ -91,6 +95,7 @@ std::vector<int> filter_entries() {
   take(err::b_g, 6);
   take(err::camera, 6);
   take(err::stereo, 6);
+  take(err::lenses, 2 * err::lens_size);
   take(err::time_offset, 1);
   take(err::wheel_radius, 2);
   take(err::track_width, 1);

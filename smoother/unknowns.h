@@ -15,7 +15,7 @@ namespace ear::smoother {
 
 struct CalibrationBlocks {
   PoseBlock camera{}, stereo{};
-  OffsetBlock offset{};
+  ImagingBlock imaging{};
   WheelBlock wheels{};
 };
 

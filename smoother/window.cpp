@@ -16,7 +16,7 @@ namespace {
 constexpr double kLeastPosition = 1e-4;
 constexpr double kLeastRotation = 1e-5;
 constexpr double kLeastCalibration = 1e-7;
-constexpr int kCalibrationSteps = 19;
+constexpr int kCalibrationSteps = 25;
 
 constexpr double kLongestInterval = 0.5;  // [s] between frames kept, but for a vehicle that stands
 constexpr double kLongestRest = 10.0;     // [s] for one that does

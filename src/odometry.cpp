@@ -89,6 +89,14 @@ class Odometry::Impl {
     };
     if (!learned.cameras.empty()) learned.cameras.front().T_BC = isometry(camera.T_BC0);
     if (learned.cameras.size() == 2) learned.cameras[1].T_BC = isometry(camera.T_BC0) * isometry(camera.T_C0C1);
+    for (std::size_t i = 0; i < learned.cameras.size(); ++i) {
+      CameraCalibration& intrinsics = learned.cameras[i];
+      const LensError& error = camera.lens_error[i];
+      intrinsics.cu += intrinsics.fu * error.principal_point.x();
+      intrinsics.cv += intrinsics.fv * error.principal_point.y();
+      intrinsics.fu *= 1.0 + error.focal_length;
+      intrinsics.fv *= 1.0 + error.focal_length;
+    }
     learned.camera_time_offset = camera.time_offset;
     if (learned.encoder) {
       learned.encoder->wheel_radius = {odometer.wheel_radius(0), odometer.wheel_radius(1)};

@@ -30,11 +30,30 @@ void Ekf::start(const ImuState& x, const Eigen::VectorXd& sigma, bool scale_is_g
   running_ = true;
   state_.imu = x;
   covariance_.reset(sigma);
+  correlate_baseline_and_lenses(sigma);
   const Eigen::RowVector2d apart(1.0 / wheel_apart_, -1.0 / wheel_apart_);
   covariance_.update(apart, err::wheel_radius, Eigen::Matrix<double, 1, 1>::Zero());
   if (!scale_is_given) return;
   const Eigen::RowVector2d mean_is_known(0.5 / kKnownScale, 0.5 / kKnownScale);
   covariance_.update(mean_is_known, err::wheel_radius, Eigen::Matrix<double, 1, 1>::Zero());
+}
+
+/// Calibration by a target shows how far away things are, the product of focal length and baseline, better than either:
+/// by as much as the mean focal length is too large, the baseline is too short.
+void Ekf::correlate_baseline_and_lenses(const Eigen::VectorXd& sigma) {
+  constexpr int kFirst = err::stereo + 3;
+  constexpr int kCount = err::lens(1) + 1 - kFirst;
+  if (!(sigma(kFirst) > 0.0)) return;
+  const Eigen::Vector3d shorter = -0.5 * state_.camera.T_C0C1.p;  // per relative error of one focal length
+  Eigen::Matrix<double, kCount, kCount> added = Eigen::Matrix<double, kCount, kCount>::Zero();
+  for (int camera = 0; camera < 2; ++camera) {
+    const int at = err::lens(camera) - kFirst;
+    const double variance = std::pow(sigma(err::lens(camera)), 2);
+    added.topLeftCorner<3, 3>() += variance * shorter * shorter.transpose();
+    added.block<3, 1>(0, at) = variance * shorter;
+    added.block<1, 3>(at, 0) = variance * shorter.transpose();
+  }
+  covariance_.inflate(kFirst, added);
 }
 
 void Ekf::assume(const State& x, const Eigen::Ref<const Eigen::MatrixXd>& P) {

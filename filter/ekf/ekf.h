@@ -108,6 +108,8 @@ class Ekf {
   [[nodiscard]] ImuErrorMatrix ordinary_covariance(double scale_sigma) const;
 
  private:
+  void correlate_baseline_and_lenses(const Eigen::VectorXd& sigma);
+
   Calibration calibration_;
   double normal_prior_;  ///< [rad]
   double wheel_apart_;   ///< of the difference of the wheel radii, relative

@@ -115,7 +115,10 @@ FilterConfig settings_for(const FilterConfig& config, const Calibration& calibra
   const std::vector<CameraCalibration>& cameras = calibration.cameras;
   if (!cameras.empty()) state_pose(cameras[0].pose_sigma, prior.camera_rotation, prior.camera_position);
   if (cameras.size() > 1) state_pose(cameras[1].pose_sigma, prior.stereo_rotation, prior.stereo_position);
-  if (cameras.size() > 1 && cameras[1].pose_sigma) prior.focal_length = 0.0;  // whoever measured it knows its lens
+  if (cameras.size() > 1 && cameras[1].pose_sigma) {  // whoever measured it knows its lens
+    prior.focal_length = 0.0;
+    prior.principal_point = 0.0;
+  }
   if (const auto& encoder = calibration.encoder) {
     const double radius = 0.5 * (encoder->wheel_radius[0] + encoder->wheel_radius[1]);
     if (const auto& sigma = encoder->wheel_radius_sigma) {

@@ -69,6 +69,12 @@ void boxplus_in_place(State& x, const Eigen::Ref<const Eigen::VectorXd>& d) {
   x.odometer.T_BO.p += d.segment<3>(err::axle);
   apply_local(x.camera.T_BC0, d.segment<3>(err::camera), d.segment<3>(err::camera + 3));
   apply_local(x.camera.T_C0C1, d.segment<3>(err::stereo), d.segment<3>(err::stereo + 3));
+  for (int camera = 0; camera < 2; ++camera) {
+    LensError& lens = x.camera.lens_error[static_cast<std::size_t>(camera)];
+    const auto change = d.segment<err::lens_size>(err::lens(camera));
+    lens.focal_length += change(0);
+    lens.principal_point += change.tail<2>();
+  }
   x.camera.time_offset += d(err::time_offset);
   for (std::size_t i = 0; i < x.clones.size(); ++i) {
     const int at = err::clone(static_cast<int>(i));
@@ -100,6 +106,12 @@ Eigen::VectorXd boxminus(const State& truth, const State& estimate) {
   d.segment<kMaxBeams>(err::beams) = truth.odometer.beam_offset - estimate.odometer.beam_offset;
   d.segment<6>(err::camera) = local_difference(truth.camera.T_BC0, estimate.camera.T_BC0);
   d.segment<6>(err::stereo) = local_difference(truth.camera.T_C0C1, estimate.camera.T_C0C1);
+  for (int camera = 0; camera < 2; ++camera) {
+    const LensError& a = truth.camera.lens_error[static_cast<std::size_t>(camera)];
+    const LensError& b = estimate.camera.lens_error[static_cast<std::size_t>(camera)];
+    d.segment<err::lens_size>(err::lens(camera)) << a.focal_length - b.focal_length,
+        a.principal_point - b.principal_point;
+  }
   d(err::time_offset) = truth.camera.time_offset - estimate.camera.time_offset;
   for (std::size_t i = 0; i < estimate.clones.size(); ++i) {
     d.segment<6>(err::clone(static_cast<int>(i))) = invariant_difference(truth.clones[i].T_WB, estimate.clones[i].T_WB);

@@ -23,16 +23,20 @@ inline const Eigen::Vector3d kGravity_W{0.0, 0.0, -9.81};  ///< [m/s^2]
 namespace err {
 inline constexpr int theta = 0, nu = 3, rho = 6, b_g = 9, b_a = 12;
 inline constexpr int imu_size = 15;
-inline constexpr int normal = imu_size;           ///< delta, tilt of the ground's normal [rad]: 2
-inline constexpr int wheel_radius = normal + 2;   ///< left, right, relative: 2
-inline constexpr int track_width = normal + 4;    ///< relative: 1
-inline constexpr int odometer = normal + 5;       ///< phi, turn of O about its own axes [rad]: 3
-inline constexpr int axle = odometer + 3;         ///< position of O in the body [m]: 3
-inline constexpr int beams = axle + 3;            ///< offset of each laser beam's range [m]
-inline constexpr int camera = beams + kMaxBeams;  ///< phi, p of camera 0 in the body: 6
-inline constexpr int stereo = camera + 6;         ///< phi, p of camera 1 in camera 0: 6
-inline constexpr int time_offset = stereo + 6;    ///< [s]
-inline constexpr int calibration_size = 13;
+inline constexpr int normal = imu_size;             ///< delta, tilt of the ground's normal [rad]: 2
+inline constexpr int wheel_radius = normal + 2;     ///< left, right, relative: 2
+inline constexpr int track_width = normal + 4;      ///< relative: 1
+inline constexpr int odometer = normal + 5;         ///< phi, turn of O about its own axes [rad]: 3
+inline constexpr int axle = odometer + 3;           ///< position of O in the body [m]: 3
+inline constexpr int beams = axle + 3;              ///< offset of each laser beam's range [m]
+inline constexpr int camera = beams + kMaxBeams;    ///< phi, p of camera 0 in the body: 6
+inline constexpr int stereo = camera + 6;           ///< phi, p of camera 1 in camera 0: 6
+inline constexpr int poses_size = 12;               ///< of these two
+inline constexpr int lenses = camera + poses_size;  ///< focal length, principal point of cameras 0 and 1: 3 each
+inline constexpr int lens_size = 3;
+[[nodiscard]] constexpr int lens(int index) { return lenses + lens_size * index; }
+inline constexpr int time_offset = lenses + 2 * lens_size;  ///< [s]
+inline constexpr int calibration_size = 19;
 inline constexpr int clones = camera + calibration_size;
 inline constexpr int clone_size = 6;  ///< theta, rho
 [[nodiscard]] constexpr int clone(int index) { return clones + clone_size * index; }
@@ -72,11 +76,26 @@ struct OdometerState {
       Eigen::Matrix<double, kMaxBeams, 1>::Zero();  ///< of the laser beams: measured less true range [m]
 };
 
-/// The cameras' geometry as the filter knows it.
+/// What the intrinsics with which features were normalized are wrong by: what is at x is measured at
+/// (1 + focal_length) x + principal_point.
+struct LensError {
+  double focal_length = 0.0;                                  ///< true less given, relative
+  Eigen::Vector2d principal_point = Eigen::Vector2d::Zero();  ///< true less given, over the focal length
+
+  [[nodiscard]] Eigen::Vector2d measured(const Eigen::Vector2d& uv) const {
+    return (1.0 + focal_length) * uv + principal_point;
+  }
+  [[nodiscard]] Eigen::Vector2d corrected(const Eigen::Vector2d& measured) const {
+    return (measured - principal_point) / (1.0 + focal_length);
+  }
+};
+
+/// The cameras as the filter knows them.
 struct CameraState {
   Pose T_BC0;                ///< camera 0 to body
   Pose T_C0C1;               ///< camera 1 to camera 0
   double time_offset = 0.0;  ///< [s] add to a camera stamp to get IMU time
+  std::array<LensError, 2> lens_error;
 };
 
 /// A camera's stamp by the clock of the IMU, and the reverse.

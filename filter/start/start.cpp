@@ -207,10 +207,16 @@ Eigen::VectorXd Start::sigma() const {
     sigma.segment<3>(err::camera + 3).setConstant(prior.camera_position);
     if (calibration_.cameras.size() == 2) {
       sigma.segment<3>(err::stereo).setConstant(prior.stereo_rotation);
-      // The state has no lens: a wrong focal length makes depths wrong as a wrong baseline does.
-      const Eigen::Array3d by_lens = prior.focal_length * camera_state(calibration_).T_C0C1.p;
-      sigma.segment<3>(err::stereo + 3) = (by_lens.square() + prior.stereo_position * prior.stereo_position).sqrt();
+      // The baseline scales with the size of the target that the cameras were calibrated with: large rigs are known to
+      // a share of it.
+      const Eigen::Array3d by_target = prior.focal_length * camera_state(calibration_).T_C0C1.p;
+      sigma.segment<3>(err::stereo + 3) = (by_target.square() + prior.stereo_position * prior.stereo_position).sqrt();
     }
+  }
+  for (std::size_t i = 0; online.intrinsics && i < calibration_.cameras.size(); ++i) {
+    const CameraCalibration& camera = calibration_.cameras[i];
+    sigma.segment<err::lens_size>(err::lens(static_cast<int>(i))) << prior.focal_length,
+        prior.principal_point / camera.fu, prior.principal_point / camera.fv;
   }
   if (online.time_offset && !calibration_.cameras.empty()) sigma(err::time_offset) = prior.time_offset;
   if (uses_wheels()) {

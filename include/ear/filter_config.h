@@ -29,7 +29,8 @@ struct PriorConfig {
   double camera_position = 1e-3;    ///< [m]
   double stereo_rotation = 2e-3;    ///< [rad] camera 1 in camera 0, the error of its principal point included
   double stereo_position = 5e-5;    ///< [m]
-  double focal_length = 1e-3;       ///< relative; counts as an error of the stereo baseline's length
+  double focal_length = 1e-3;       ///< of each camera, relative
+  double principal_point = 0.5;     ///< [px] of each camera, each axis
   double time_offset = 2e-3;        ///< [s] camera against IMU
   double wheel_radius = 4e-3;       ///< of both wheels alike, relative
   double wheel_apart = 1e-3;        ///< of each wheel by itself, relative
@@ -45,6 +46,7 @@ struct PriorConfig {
 /// What is calibrated while running. A frozen quantity keeps its value, and its uncertainty is not accounted for.
 struct OnlineCalibrationConfig {
   bool camera_extrinsics = true;  ///< pose of camera 0 in the body, and of camera 1 in camera 0
+  bool intrinsics = true;         ///< focal length and principal point of each camera
   bool time_offset = true;        ///< camera against IMU
   bool wheels = true;             ///< wheel radii, and their track width where the yaw rate is used
   bool odometer_rotation = true;  ///< the odometer's mounting in the body

@@ -65,6 +65,7 @@ EnableFor<C, PriorConfig> visit(C& c, F&& f) {
   f("stereo_rotation", c.stereo_rotation);
   f("stereo_position", c.stereo_position);
   f("focal_length", c.focal_length);
+  f("principal_point", c.principal_point);
   f("time_offset", c.time_offset);
   f("wheel_radius", c.wheel_radius);
   f("wheel_apart", c.wheel_apart);
@@ -94,6 +95,7 @@ EnableFor<C, StandstillConfig> visit(C& c, F&& f) {
 template <typename C, typename F>
 EnableFor<C, OnlineCalibrationConfig> visit(C& c, F&& f) {
   f("camera_extrinsics", c.camera_extrinsics);
+  f("intrinsics", c.intrinsics);
   f("time_offset", c.time_offset);
   f("wheels", c.wheels);
   f("odometer_rotation", c.odometer_rotation);

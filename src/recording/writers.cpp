@@ -93,6 +93,10 @@ nlohmann::ordered_json to_json(const Eigen::Isometry3d& T) {
 nlohmann::ordered_json to_json(const Calibration& calibration) {
   nlohmann::ordered_json json = nlohmann::ordered_json::object();
   const std::vector<CameraCalibration>& cameras = calibration.cameras;
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    const CameraCalibration& camera = cameras[i];
+    json["intrinsics_" + std::to_string(i)] = {camera.fu, camera.fv, camera.cu, camera.cv};
+  }
   if (!cameras.empty()) {
     json["camera_time_offset"] = calibration.camera_time_offset;
     json["T_BC0"] = to_json(cameras[0].T_BC);

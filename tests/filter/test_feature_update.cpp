@@ -35,7 +35,9 @@ Eigen::Vector2d project(const State& x, int clone, int camera, const Eigen::Vect
   const Eigen::Vector3d f_B = T_WB.R.inverse() * (f_W - T_WB.p);
   Eigen::Vector3d f_C = x.camera.T_BC0.R.inverse() * (f_B - x.camera.T_BC0.p);
   if (camera == 1) f_C = x.camera.T_C0C1.R.inverse() * (f_C - x.camera.T_C0C1.p);
-  return {f_C.x() / f_C.z(), f_C.y() / f_C.z()};
+  const LensError& lens = x.camera.lens_error[static_cast<std::size_t>(camera)];
+  const double focal = 1.0 + lens.focal_length;
+  return {focal * f_C.x() / f_C.z() + lens.principal_point.x(), focal * f_C.y() / f_C.z() + lens.principal_point.y()};
 }
 
 /// Both cameras of the clones from `first` on see the point, with noise; `outlier` is added to one x, that of camera 0
@@ -44,12 +46,15 @@ void see(std::mt19937_64& rng, const Eigen::Vector3d& f_W, int first, double out
   std::vector<CameraPose> cameras;
   camera_poses(scene.x, cameras);
   std::vector<std::pair<int, int>> who;
+  std::vector<Eigen::Vector2d> seen;
   for (int i = first; i < static_cast<int>(scene.x.clones.size()); ++i) {
     for (int camera = 0; camera < 2; ++camera) {
       Eigen::Vector2d uv = project(scene.x, i, camera, f_W) + kSigma * random_vector(rng, 1.0).head<2>();
       if (i == 1 && camera == 0) uv.x() += outlier;
       const CameraPose& pose = cameras[static_cast<std::size_t>(2 * i + camera)];
-      scene.sightings.push_back({pose.R_CW, pose.p_WC, uv});
+      const LensError& lens = scene.x.camera.lens_error[static_cast<std::size_t>(camera)];
+      scene.sightings.push_back({pose.R_CW, pose.p_WC, lens.corrected(uv)});
+      seen.push_back(uv);
       who.emplace_back(i, camera);
     }
   }
@@ -57,8 +62,7 @@ void see(std::mt19937_64& rng, const Eigen::Vector3d& f_W, int first, double out
   REQUIRE(point);
   scene.point = *point;
   for (std::size_t k = 0; k < who.size(); ++k) {
-    scene.observations.push_back(
-        linearize_observation(scene.x, who[k].first, who[k].second, scene.point, scene.sightings[k].uv));
+    scene.observations.push_back(linearize_observation(scene.x, who[k].first, who[k].second, scene.point, seen[k]));
   }
 }
 
@@ -103,7 +107,8 @@ void stack(const Scene& scene, Eigen::MatrixXd& H_x, Eigen::MatrixXd& H_f, Eigen
   for (std::size_t k = 0; k < scene.observations.size(); ++k) {
     const LinearizedObservation& z = scene.observations[k];
     const auto row = static_cast<Eigen::Index>(2 * k);
-    H_x.block<2, 12>(row, err::camera) = z.H_calibration / kSigma;
+    H_x.block<2, err::poses_size>(row, err::camera) = z.H_poses / kSigma;
+    H_x.block<2, err::lens_size>(row, err::lens(z.camera)) = z.H_lens / kSigma;
     H_x.block<2, 6>(row, err::clone(z.clone)) = z.H_clone / kSigma;
     H_f.middleRows<2>(row) = z.H_f / kSigma;
     r.segment<2>(row) = z.residual / kSigma;
@@ -145,7 +150,8 @@ TEST_CASE("feature: H is the derivative of the observation, for both cameras, ca
       const Eigen::Vector3d f_W = scene.point.scaled_W() / scene.point.inverse_depth;
       const LinearizedObservation z = linearize_observation(scene.x, 1, camera, scene.point, Eigen::Vector2d::Zero());
       Eigen::MatrixXd H = Eigen::MatrixXd::Zero(2, scene.x.error_size());
-      H.block<2, 12>(0, err::camera) = z.H_calibration;
+      H.block<2, err::poses_size>(0, err::camera) = z.H_poses;
+      H.block<2, err::lens_size>(0, err::lens(camera)) = z.H_lens;
       H.block<2, 6>(0, err::clone(1)) = z.H_clone;
       check_jacobian(
           [&](const Eigen::VectorXd& d) -> Eigen::VectorXd { return project(boxplus(scene.x, d), 1, camera, f_W); }, H);
@@ -219,7 +225,9 @@ TEST_CASE("feature: rows left out as negligible take no more than their share, a
   const Eigen::MatrixXd missing = all.transpose() * all - most.transpose() * most;
   Eigen::VectorXd known = Eigen::VectorXd::Zero(missing.rows());  // what the features tell, were they known
   for (const LinearizedObservation& z : scene.observations) {
-    known.head<12>() += z.H_calibration.cwiseAbs2().colwise().sum().transpose() / (kSigma * kSigma);
+    known.head<err::poses_size>() += z.H_poses.cwiseAbs2().colwise().sum().transpose() / (kSigma * kSigma);
+    known.segment<err::lens_size>(err::lens(z.camera) - err::camera) +=
+        z.H_lens.cwiseAbs2().colwise().sum().transpose() / (kSigma * kSigma);
     known.segment<6>(err::clone(z.clone) - err::camera) +=
         z.H_clone.cwiseAbs2().colwise().sum().transpose() / (kSigma * kSigma);
   }

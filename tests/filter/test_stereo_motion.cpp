@@ -59,7 +59,7 @@ Pair look(const Eigen::Matrix3d& R_B0B1, const Eigen::Vector3d& p_B0B1, double s
   return pair;
 }
 
-std::vector<StereoMatch> matched(const Pair& pair) { return StereoMatches().find(pair.from, pair.to); }
+std::vector<StereoMatch> matched(const Pair& pair) { return StereoMatches().find(pair.from, pair.to, {}); }
 
 const Eigen::Vector3d kTurn(0.02, -0.01, 0.05);
 const Eigen::Vector3d kWay(0.15, -0.02, 0.03);

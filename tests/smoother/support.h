@@ -29,8 +29,13 @@ inline Eigen::VectorXd residual(const ceres::CostFunction& cost, const std::vect
   return r;
 }
 
+/// Of all blocks with seven numbers only a pose begins with a unit quaternion.
+inline bool is_pose(const Eigen::VectorXd& value) {
+  return value.size() == 7 && std::abs(value.head<4>().norm() - 1.0) < 1e-9;
+}
+
 inline Eigen::VectorXd stepped(const Eigen::VectorXd& value, const Eigen::VectorXd& step) {
-  if (value.size() != 7) return value + step;
+  if (!is_pose(value)) return value + step;
   Eigen::VectorXd result(7);
   PoseManifold{}.Plus(value.data(), step.data(), result.data());
   return result;
@@ -46,7 +51,7 @@ inline Eigen::MatrixXd jacobian(const ceres::CostFunction& cost, const std::vect
   std::vector<double*> jacobians(values.size(), nullptr);
   jacobians[which] = J.data();
   REQUIRE(cost.Evaluate(blocks.data(), r.data(), jacobians.data()));
-  return values[which].size() == 7 ? Eigen::MatrixXd(J.leftCols(6)) : Eigen::MatrixXd(J);
+  return is_pose(values[which]) ? Eigen::MatrixXd(J.leftCols(6)) : Eigen::MatrixXd(J);
 }
 
 inline void check_factor(const ceres::CostFunction& cost, const std::vector<Eigen::VectorXd>& values,

@@ -37,8 +37,8 @@ struct Scene {
     const Eigen::Vector3d p_W = anchor.scaled_W() / anchor.inverse_depth;
     const Eigen::Vector3d p_C0 = R_WC.transpose() * (p_W - p_WC);
     const Eigen::Vector3d p_C1 = cameras.T_C0C1.R.transpose() * (p_C0 - cameras.T_C0C1.p);
-    left.uv = p_C0.hnormalized();
-    right.uv = p_C1.hnormalized();
+    left.uv = cameras.lens_error[0].measured(p_C0.hnormalized());
+    right.uv = cameras.lens_error[1].measured(p_C1.hnormalized());
     for (Observation* seen : {&left, &right}) {
       seen->sigma = 2e-3;
       seen->rate_B = random_vector(rng, 0.5);
@@ -47,11 +47,14 @@ struct Scene {
     }
   }
 
-  [[nodiscard]] std::vector<Eigen::VectorXd> values(bool with_right, double offset) const {
+  [[nodiscard]] std::vector<Eigen::VectorXd> values(bool with_right, double time_offset) const {
     const PointBlock point = to_block(anchor);
+    CameraState imaging = cameras;
+    imaging.time_offset = time_offset;
+    const ImagingBlock values = imaging_block(imaging);
     std::vector<Eigen::VectorXd> result = {block(T_WB), block(cameras.T_BC0)};
     if (with_right) result.push_back(block(cameras.T_C0C1));
-    result.push_back(Eigen::VectorXd::Constant(1, offset));
+    result.push_back(Eigen::Map<const Eigen::VectorXd>(values.data(), 7));
     result.push_back(Eigen::Map<const Eigen::VectorXd>(point.data(), 3));
     return result;
   }
@@ -74,8 +77,8 @@ TEST_CASE("factors: a feature where it is seen leaves nothing; seen later, it mo
   ahead.inverse_depth = 0.5;
   const Eigen::VectorXd camera = block({ahead.R_WA, Eigen::Vector3d::Zero()});
   const Eigen::VectorXd r = residual(
-      LeftFactor(seen, ahead),
-      {block(Pose{}), camera, Eigen::VectorXd::Constant(1, 0.01), Eigen::Vector3d(0.0, 0.0, ahead.inverse_depth)});
+      LeftFactor(seen, ahead), {block(Pose{}), camera, 0.01 * Eigen::VectorXd::Unit(7, imaging_entry::time_offset),
+                                Eigen::Vector3d(0.0, 0.0, ahead.inverse_depth)});
   CHECK(r(0) == doctest::Approx(-5e-3));
   CHECK(std::abs(r(1)) < 1e-12);
 }

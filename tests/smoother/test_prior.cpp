@@ -21,7 +21,7 @@ struct Blocks {
   std::array<PoseBlock, 2> pose;
   std::array<MotionBlock, 2> motion;
   PoseBlock camera;
-  OffsetBlock offset{1e-3};
+  std::array<double, 1> offset{1e-3};
 
   explicit Blocks(std::mt19937_64& rng) {
     for (int i = 0; i < 2; ++i) {

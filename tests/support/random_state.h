@@ -25,6 +25,10 @@ inline CameraState random_cameras(std::mt19937_64& rng) {
   camera.T_BC0 = {exp_so3(random_vector(rng, 0.1)) * R_BC, random_vector(rng, 0.05)};
   camera.T_C0C1 = {exp_so3(random_vector(rng, 0.01)), Eigen::Vector3d(0.05, 0, 0) + random_vector(rng, 0.001)};
   camera.time_offset = 1e-3;
+  for (LensError& lens : camera.lens_error) {
+    lens.focal_length = random_vector(rng, 3e-3).x();
+    lens.principal_point = random_vector(rng, 3e-3).head<2>();
+  }
   return camera;
 }
 

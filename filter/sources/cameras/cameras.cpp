@@ -47,7 +47,7 @@ void Cameras::measure_noise(const FeatureFrame& frame, const CameraState& camera
 Displacement Cameras::displacement(const FeatureFrame& frame, TimeNs t_ns, const ImuMotion& motion, const Ekf& ekf) {
   Displacement result;
   if (ekf.state().imu.t_ns == compared_.t_ns) {  // else the frame before was not where the state is
-    const std::vector<StereoMatch>& matches = matches_.find(compared_.before, frame);
+    const std::vector<StereoMatch>& matches = matches_.find(compared_.before, frame, ekf.state().camera.lens_error);
     compared_.matched_ns = compared_.before.t_ns;
     StereoMotion start;
     start.R_B0B1 = motion.R_BiBj;
@@ -78,11 +78,11 @@ Pose Cameras::motion_since_image(const State& x) const {
   return {T_WB0.R.transpose() * x.imu.R_WB, T_WB0.R.transpose() * (x.imu.p_WB - T_WB0.p)};
 }
 
-const std::vector<StereoMatch>& Cameras::matches_with(const FeatureFrame& frame) {
+const std::vector<StereoMatch>& Cameras::matches_with(const FeatureFrame& frame, const CameraState& cameras) {
   if (compared_.matched_ns == last_->t_ns) return matches_.found();
   compared_.matched_ns = last_->t_ns;
   compared_.seen.reset();
-  return matches_.find(last_features_, frame);
+  return matches_.find(last_features_, frame, cameras.lens_error);
 }
 
 bool Cameras::bridge(const FeatureFrame& frame, Ekf& ekf) {
@@ -92,7 +92,8 @@ bool Cameras::bridge(const FeatureFrame& frame, Ekf& ekf) {
   StereoMotion start;
   start.R_B0B1 = moved.R;
   start.p_B0B1 = moved.p;
-  const std::optional<StereoMotion> motion = stereo_motion(matches_with(frame), x.camera, start, feature_sigma());
+  const std::optional<StereoMotion> motion =
+      stereo_motion(matches_with(frame, x.camera), x.camera, start, feature_sigma());
   if (!motion) return false;
   const int newest = static_cast<int>(x.clones.size()) - 1;
   const RelativeMotionRows rows = linearize_relative_motion(x, newest, {motion->R_B0B1, motion->p_B0B1});
@@ -133,7 +134,7 @@ FrameAgreement Cameras::compare(const FeatureFrame& frame, const Ekf& ekf) {
     const Pose moved = motion_since_image(x);
     const double sigma_v = std::sqrt(ekf.covariance().matrix().diagonal().segment<3>(err::nu).maxCoeff());
     const double sigma_p = dt * sigma_v;
-    agreement = frame_check_.compare(matches_with(frame), {moved.R, moved.p, sigma_p}, x.camera, noise_);
+    agreement = frame_check_.compare(matches_with(frame, x.camera), {moved.R, moved.p, sigma_p}, x.camera, noise_);
     compared_.agrees = !agreement.contradicts();
     if (compared_.seen) {
       const Eigen::Matrix3d loose = Eigen::Matrix3d::Identity() * std::pow(kLooser * sigma_p, 2);

@@ -85,7 +85,7 @@ class Cameras {
   [[nodiscard]] double feature_sigma() const { return noise_ * config_.feature_sigma_px / focal_px_; }
   [[nodiscard]] Pose motion_since_image(const State& x) const;
   /// Of the last image that was used with the frame at hand.
-  const std::vector<StereoMatch>& matches_with(const FeatureFrame& frame);
+  const std::vector<StereoMatch>& matches_with(const FeatureFrame& frame, const CameraState& cameras);
   [[nodiscard]] double apparent_rate(double dt, const Ekf& ekf) const;
   void marginalise(std::optional<std::size_t> clone, Ekf& ekf);
 

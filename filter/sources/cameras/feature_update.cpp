@@ -9,10 +9,10 @@
 namespace ear {
 namespace {
 
-constexpr int kCalibration = 12;  // columns of the cameras' poses; the time offset acts through the clones
-
-/// First column of a clone, counted from err::camera.
+/// First columns of a clone and of a lens, counted from err::camera; the cameras' poses come first. The time offset
+/// acts through the clones.
 constexpr int clone_column(int clone) { return err::clone(clone) - err::camera; }
+constexpr int lens_column(int camera) { return err::lens(camera) - err::camera; }
 
 ConstMatrix readable(const Eigen::MatrixXd& M) { return {M.data(), M.outerStride()}; }
 MutableMatrix writable(Eigen::MatrixXd& M) { return {M.data(), M.outerStride()}; }
@@ -69,11 +69,14 @@ LinearizedObservation linearize_observation(const Pose& T_WB, const CameraState&
   const Eigen::Vector3d from_C1_C0 = f_C0 - s * T_C0C1.p;
   const Eigen::Vector3d h = camera == 0 ? f_C0 : Eigen::Vector3d(T_C0C1.R.transpose() * from_C1_C0);
 
-  const double w = 1.0 / h.z();
+  const Eigen::Vector2d projected = h.hnormalized();
+  const LensError& lens = cameras.lens_error[static_cast<std::size_t>(camera)];
+  const double w = (1.0 + lens.focal_length) / h.z();
   LinearizedObservation z;
-  z.residual = uv - h.head<2>() * w;
+  z.camera = camera;
+  z.residual = uv - lens.measured(projected);
   Eigen::Matrix<double, 2, 3> J_C;  // d uv / d h
-  J_C << w, 0.0, -h.x() * w * w, 0.0, w, -h.y() * w * w;
+  J_C << w, 0.0, -w * projected.x(), 0.0, w, -w * projected.y();
   const Eigen::Matrix<double, 2, 3> J_C0 = camera == 0 ? J_C : Eigen::Matrix<double, 2, 3>(J_C * T_C0C1.R.transpose());
   const Eigen::Matrix<double, 2, 3> J_B = J_C0 * R_C0B;
   const Eigen::Matrix<double, 2, 3> J_W = J_B * T_WB.R.transpose();
@@ -82,14 +85,15 @@ LinearizedObservation linearize_observation(const Pose& T_WB, const CameraState&
   z.H_clone.leftCols<3>() = J_W * skew(f_W);
   z.H_clone.rightCols<3>() = -s * J_W;
   z.H_f = J_W;
-  z.H_calibration.leftCols<3>() = J_B * skew(from_C0_B);
-  z.H_calibration.middleCols<3>(3) = -s * J_B;
+  z.H_poses.leftCols<3>() = J_B * skew(from_C0_B);
+  z.H_poses.middleCols<3>(3) = -s * J_B;
   if (camera == 0) {
-    z.H_calibration.rightCols<6>().setZero();
+    z.H_poses.rightCols<6>().setZero();
   } else {
-    z.H_calibration.middleCols<3>(6) = J_C0 * skew(from_C1_C0);
-    z.H_calibration.rightCols<3>() = -s * J_C0;
+    z.H_poses.middleCols<3>(6) = J_C0 * skew(from_C1_C0);
+    z.H_poses.rightCols<3>() = -s * J_C0;
   }
+  z.H_lens << projected, Eigen::Matrix2d::Identity();
   return z;
 }
 
@@ -145,7 +149,8 @@ bool FeatureInformation::add(const std::vector<LinearizedObservation>& observati
   for (std::size_t i = 0; i < observations.size(); ++i) {
     const LinearizedObservation& z = observations[i];
     const Eigen::Matrix<double, 2, 3> weighted_H_f = weights_[i] * z.H_f;
-    W.topRows<kCalibration>().noalias() += z.H_calibration.transpose().lazyProduct(weighted_H_f);
+    W.topRows<err::poses_size>().noalias() += z.H_poses.transpose().lazyProduct(weighted_H_f);
+    W.middleRows<err::lens_size>(lens_column(z.camera)).noalias() += z.H_lens.transpose().lazyProduct(weighted_H_f);
     W.middleRows<err::clone_size>(clone_column(z.clone)).noalias() += z.H_clone.transpose().lazyProduct(weighted_H_f);
   }
   kernels_.solve({V_llt.matrixLLT().data(), 3}, size_, 3, {W.data(), W.outerStride()});
@@ -168,12 +173,18 @@ void FeatureInformation::sum_up(const std::vector<LinearizedObservation>& observ
     const LinearizedObservation& z = observations[i];
     const double w = weights_[i];
     const int at = clone_column(z.clone);
-    const Eigen::Matrix<double, kCalibration, 2> Hw_cal = w * z.H_calibration.transpose();
+    const int lens = lens_column(z.camera);
+    const Eigen::Matrix<double, err::poses_size, 2> Hw_poses = w * z.H_poses.transpose();
+    const Eigen::Matrix<double, err::lens_size, 2> Hw_lens = w * z.H_lens.transpose();
     const Eigen::Matrix<double, err::clone_size, 2> Hw_clone = w * z.H_clone.transpose();
-    A.topLeftCorner<kCalibration, kCalibration>().noalias() += Hw_cal.lazyProduct(z.H_calibration);
-    A.block<err::clone_size, kCalibration>(at, 0).noalias() += Hw_clone.lazyProduct(z.H_calibration);
+    A.topLeftCorner<err::poses_size, err::poses_size>().noalias() += Hw_poses.lazyProduct(z.H_poses);
+    A.block<err::lens_size, err::poses_size>(lens, 0).noalias() += Hw_lens.lazyProduct(z.H_poses);
+    A.block<err::lens_size, err::lens_size>(lens, lens).noalias() += Hw_lens.lazyProduct(z.H_lens);
+    A.block<err::clone_size, err::poses_size>(at, 0).noalias() += Hw_clone.lazyProduct(z.H_poses);
+    A.block<err::clone_size, err::lens_size>(at, lens).noalias() += Hw_clone.lazyProduct(z.H_lens);
     A.block<err::clone_size, err::clone_size>(at, at).noalias() += Hw_clone.lazyProduct(z.H_clone);
-    b.head<kCalibration>().noalias() += Hw_cal.lazyProduct(z.residual);
+    b.head<err::poses_size>().noalias() += Hw_poses.lazyProduct(z.residual);
+    b.segment<err::lens_size>(lens).noalias() += Hw_lens.lazyProduct(z.residual);
     b.segment<err::clone_size>(at).noalias() += Hw_clone.lazyProduct(z.residual);
   }
   b.head(size_).noalias() -= W_.block(0, 3 * features_, size_, 3) * Lv;

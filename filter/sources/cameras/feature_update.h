@@ -19,11 +19,14 @@ struct CameraPose {
   Eigen::Vector3d p_WC;
 };
 
-/// One observation of a feature, linearized, not yet whitened: residual = H_camera e_cal + H_clone e_clone + H_f f + n.
+/// One observation of a feature, linearized, not yet whitened: residual = H_poses e_poses + H_lens e_lens +
+/// H_clone e_clone + H_f f + n.
 struct LinearizedObservation {
   int clone = 0;
-  Eigen::Vector2d residual;                    ///< measured - predicted, normalized coordinates
-  Eigen::Matrix<double, 2, 12> H_calibration;  ///< phi, p of camera 0 in B; phi, p of camera 1 in camera 0
+  int camera = 0;
+  Eigen::Vector2d residual;                           ///< measured - predicted, normalized coordinates
+  Eigen::Matrix<double, 2, err::poses_size> H_poses;  ///< phi, p of camera 0 in B; phi, p of camera 1 in camera 0
+  Eigen::Matrix<double, 2, err::lens_size> H_lens;    ///< of this camera
   Eigen::Matrix<double, 2, err::clone_size> H_clone;
   Eigen::Matrix<double, 2, 3> H_f;  ///< feature times its inverse depth, world axes
   double noise = 1.0;               ///< its standard deviation, times that of all observations

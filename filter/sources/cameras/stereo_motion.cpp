@@ -125,7 +125,9 @@ StereoMatches::StereoMatches() {
   matches_.reserve(kFeatureCapacity);
 }
 
-const std::vector<StereoMatch>& StereoMatches::find(const FeatureFrame& from, const FeatureFrame& to) {
+const std::vector<StereoMatch>& StereoMatches::find(const FeatureFrame& from, const FeatureFrame& to,
+                                                    const std::array<LensError, 2>& lens_error) {
+  const auto& [left, right] = lens_error;
   earlier_.clear();
   matches_.clear();
   for (const FeatureObservation& feature : from.features) {
@@ -136,7 +138,9 @@ const std::vector<StereoMatch>& StereoMatches::find(const FeatureFrame& from, co
   for (const FeatureObservation& now : to.features) {
     const auto found = std::lower_bound(earlier_.begin(), earlier_.end(), &now, by_id);
     if (found == earlier_.end() || (*found)->id != now.id) continue;
-    matches_.push_back({(*found)->left, (*found)->right, now.left, now.right, now.has_right});
+    const FeatureObservation& before = **found;
+    matches_.push_back({left.corrected(before.left), right.corrected(before.right), left.corrected(now.left),
+                        right.corrected(now.right), now.has_right});
   }
   return matches_;
 }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <optional>
 #include <vector>
 
@@ -24,8 +25,9 @@ class StereoMatches {
  public:
   StereoMatches();
 
-  /// The features of both frames; valid until the next call.
-  const std::vector<StereoMatch>& find(const FeatureFrame& from, const FeatureFrame& to);
+  /// The features of both frames, what is known of the lenses' errors taken out; valid until the next call.
+  const std::vector<StereoMatch>& find(const FeatureFrame& from, const FeatureFrame& to,
+                                       const std::array<LensError, 2>& lens_error);
   [[nodiscard]] const std::vector<StereoMatch>& found() const { return matches_; }
 
  private:

@@ -82,14 +82,15 @@ bool TrackUpdate::continues(std::uint64_t id) const {
 bool TrackUpdate::add(const Track& track, const Ekf& ekf) {
   const State& x = ekf.state();
   sightings_.clear();
-  const auto camera = [&](int clone, int which) { return cameras_[static_cast<std::size_t>(2 * clone + which)]; };
+  const auto see = [&](int clone, int which, const Eigen::Vector2d& uv) {
+    const CameraPose& camera = cameras_[static_cast<std::size_t>(2 * clone + which)];
+    sightings_.push_back(
+        {camera.R_CW, camera.p_WC, x.camera.lens_error[static_cast<std::size_t>(which)].corrected(uv)});
+  };
   for (const TrackObservation& o : track.observations) {
     const int clone = clone_index(x, o.frame);
-    const CameraPose& left = camera(clone, 0);
-    sightings_.push_back({left.R_CW, left.p_WC, o.left});
-    if (!o.has_right) continue;
-    const CameraPose& right = camera(clone, 1);
-    sightings_.push_back({right.R_CW, right.p_WC, o.right});
+    see(clone, 0, o.left);
+    if (o.has_right) see(clone, 1, o.right);
   }
   const std::optional<InverseDepthPoint> point = triangulate(sightings_);
   if (!point) return false;
