@@ -173,7 +173,7 @@ bool Ekf::possible() const {
                       state_.camera.T_BC0.R.allFinite() && state_.camera.T_BC0.p.allFinite() &&
                       o.wheel_radius.allFinite() && std::isfinite(o.track_width) && o.T_BO.R.allFinite() &&
                       o.T_BO.p.allFinite() && o.beam_offset.allFinite() && state_.ground.n_W.allFinite() &&
-                      std::isfinite(P.sum());  // one that is not makes the sum so
+                      P.topLeftCorner<err::imu_size, err::imu_size>().allFinite() && P.diagonal().allFinite();
   return finite && P.diagonal().minCoeff() >= 0.0;
 }
 
