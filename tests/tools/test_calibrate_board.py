@@ -136,6 +136,26 @@ class Live(unittest.TestCase):
             self.assertEqual(len(separation), 1)
             self.assertTrue((root / "found/encoder0/sensor.yaml").is_file())
 
+    def test_finds_a_right_camera_that_is_off_its_epipolar_lines(self):
+        """By 5 px: more than the front end allows a pair that was calibrated."""
+        off = 5.0
+        with tempfile.TemporaryDirectory() as folder:
+            root = Path(folder)
+            made = run("simulate", "flat1", "--seed", "4", "--duration", "9", "--camera-rate", "6", "--out", root)
+            self.assertEqual(made.returncode, 0, made.stderr)
+            file = root / "mav0/cam1/sensor.yaml"
+            text = file.read_text(encoding="utf-8")
+            cv = f"{TRUTH['cam1: principal point v']:.6f}]"
+            self.assertIn(cv, text)
+            file.write_text(text.replace(cv, f"{TRUTH['cam1: principal point v'] + off:.6f}]"), encoding="utf-8")
+            done = run("live", "--sensors", root, "--calibrate", root / "found")
+            self.assertEqual(done.returncode, 0, done.stderr)
+            found = json.loads((root / "found/calibration.json").read_text(encoding="utf-8"))
+            entries = {entry["name"]: entry for entry in found["parameters"]}
+            left, right = (entries[f"cam{i}: principal point v"] for i in (0, 1))
+            self.assertTrue(right["shown"])
+            self.assertLess(abs(right["change"] - left["change"] + off), 0.5)
+
     def test_not_with_a_view(self):
         done = run("live", "--sensors", "/", "--calibrate", "x", "--check")
         self.assertNotEqual(done.returncode, 0)

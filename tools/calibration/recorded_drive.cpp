@@ -10,9 +10,7 @@
 #include "tools/replay.h"
 
 namespace ear::calibration {
-namespace {
 
-/// What the right camera may be off by, with both principal points: so far from its epipolar line a feature is sought.
 Calibration for_search(Calibration calibration) {
   if (calibration.cameras.size() < 2) return calibration;
   const Priors priors = priors_of(calibration);
@@ -21,8 +19,6 @@ Calibration for_search(Calibration calibration) {
   right.pose_sigma = PoseSigma{std::hypot(priors.stereo_rotation, lens), priors.stereo_position};
   return calibration;
 }
-
-}  // namespace
 
 Drive recorded_drive(Recording& recording, const std::string& name, const Config& config,
                      const std::function<void(double)>& progress) {

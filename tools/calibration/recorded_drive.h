@@ -11,6 +11,10 @@
 
 namespace ear::calibration {
 
+/// `calibration`, stating of the right camera's rotation what it and both principal points may be off by before they
+/// are calibrated: so far from its epipolar line the front end seeks a feature.
+[[nodiscard]] Calibration for_search(Calibration calibration);
+
 /// `progress` is told how far it is, 0 to 1. Throws InputError for a recording that cannot be read.
 [[nodiscard]] Drive recorded_drive(Recording& recording, const std::string& name, const Config& config,
                                    const std::function<void(double)>& progress);
