@@ -91,17 +91,24 @@ std::string to_text(const Result& result) {
   if (std::abs(result.laser_time) > 1e-3) text += clock_line("laser0", result.laser_time);
   text += line("noise found: features %.2f px, slip %.2g m/sqrt(m), beams %.2g m\n", result.noise.pixel,
                result.noise.roll.slip, result.noise.beam);
+  if (result.noise.roll.common > 0.0) {
+    text += line("both wheels alike slip by %.2g m/sqrt(m) against the reference, or it drifts by that\n",
+                 result.noise.roll.common);
+  }
   if (result.left_out > 0.0) text += line("%.1f s of the drives were left out: no estimate there\n", result.left_out);
   return text;
 }
 
 std::string to_json(const Result& result) {
-  const Json json{
-      {"parameters", json_of(result.findings)},
-      {"noise", {{"feature_px", result.noise.pixel}, {"slip", result.noise.roll.slip}, {"beam", result.noise.beam}}},
-      {"encoder_time_offset", result.encoder_time},
-      {"laser_time_offset", result.laser_time},
-      {"left_out_s", result.left_out}};
+  const Json json{{"parameters", json_of(result.findings)},
+                  {"noise",
+                   {{"feature_px", result.noise.pixel},
+                    {"slip", result.noise.roll.slip},
+                    {"common_slip", result.noise.roll.common},
+                    {"beam", result.noise.beam}}},
+                  {"encoder_time_offset", result.encoder_time},
+                  {"laser_time_offset", result.laser_time},
+                  {"left_out_s", result.left_out}};
   return json.dump(1) + "\n";
 }
 
