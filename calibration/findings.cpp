@@ -15,27 +15,56 @@ Eigen::MatrixXd prior_covariance(const std::vector<Entry>& entries, const std::v
   return variance.asDiagonal();
 }
 
-/// What was not shown goes back to the given value, and what hangs on it with it: the mean of the others given these.
-/// They are then as uncertain as they are with what the given values may be wrong by. Returns the covariance of all.
-Eigen::MatrixXd refuse(const std::vector<Entry>& entries, const std::vector<bool>& shown, Eigen::MatrixXd P) {
+/// The entries that are kept at the given value, and how the others hang on them.
+struct Split {
   std::vector<int> kept, moved;
-  for (std::size_t i = 0; i < entries.size(); ++i) (shown[i] ? moved : kept).push_back(static_cast<int>(i));
+  Eigen::MatrixXd gain;  ///< what a step of the kept ones moves the others by
+};
+
+Split split(const std::vector<bool>& shown, const Eigen::MatrixXd& P) {
+  Split split;
+  for (std::size_t i = 0; i < shown.size(); ++i) (shown[i] ? split.moved : split.kept).push_back(static_cast<int>(i));
+  const Eigen::MatrixXd P_kept = P(split.kept, split.kept);
+  const Eigen::MatrixXd P_cross = P(split.moved, split.kept);
+  if (!split.kept.empty()) split.gain = P_kept.ldlt().solve(P_cross.transpose()).transpose();
+  return split;
+}
+
+/// Of all, with the kept ones as uncertain as they were given, and the others with what those may be wrong by.
+Eigen::MatrixXd covariance_after(const std::vector<Entry>& entries, const Split& split, Eigen::MatrixXd P) {
+  const auto& [kept, moved, G] = split;
   if (kept.empty()) return P;
-  const auto value = [&](int i) -> double& { return *entries[static_cast<std::size_t>(i)].value; };
-  Eigen::VectorXd change(static_cast<Eigen::Index>(kept.size()));
-  for (std::size_t i = 0; i < kept.size(); ++i) change(static_cast<Eigen::Index>(i)) = -value(kept[i]);
-  const Eigen::MatrixXd P_kept = P(kept, kept);
-  const Eigen::MatrixXd P_cross = P(moved, kept);
-  const Eigen::MatrixXd G = P_kept.ldlt().solve(P_cross.transpose()).transpose();
-  const Eigen::VectorXd others = G * change;
-  for (std::size_t i = 0; i < moved.size(); ++i) value(moved[i]) += others(static_cast<Eigen::Index>(i));
-  for (const int i : kept) value(i) = 0.0;
   const Eigen::MatrixXd P0 = prior_covariance(entries, kept);
+  const Eigen::MatrixXd P_kept = P(kept, kept);
   P(moved, moved) += G * (P0 - P_kept) * G.transpose();
   P(kept, kept) = P0;
   P(moved, kept) = G * P0;
   P(kept, moved) = (G * P0).transpose();
   return P;
+}
+
+/// What was not shown goes back to the given value, and what hangs on it with it: the mean of the others given these.
+void move_back(const std::vector<Entry>& entries, const Split& split) {
+  const auto value = [&](int i) -> double& { return *entries[static_cast<std::size_t>(i)].value; };
+  Eigen::VectorXd change(static_cast<Eigen::Index>(split.kept.size()));
+  for (std::size_t i = 0; i < split.kept.size(); ++i) change(static_cast<Eigen::Index>(i)) = -value(split.kept[i]);
+  if (split.kept.empty()) return;
+  const Eigen::VectorXd others = split.gain * change;
+  for (std::size_t i = 0; i < split.moved.size(); ++i) value(split.moved[i]) += others(static_cast<Eigen::Index>(i));
+  for (const int i : split.kept) value(i) = 0.0;
+}
+
+/// Those that came below; true if some that had been did not.
+bool drop_hidden(const std::vector<Entry>& entries, const Eigen::MatrixXd& P, double shown_below,
+                 std::vector<bool>& shown) {
+  bool dropped = false;
+  for (std::size_t i = 0; i < entries.size(); ++i) {
+    const auto k = static_cast<Eigen::Index>(i);
+    if (!shown[i] || std::sqrt(P(k, k)) < shown_below * entries[i].prior) continue;
+    shown[i] = false;
+    dropped = true;
+  }
+  return dropped;
 }
 
 void find_entangled(const std::vector<Entry>& entries, const Eigen::MatrixXd& P, std::vector<Finding>& findings) {
@@ -54,13 +83,16 @@ void find_entangled(const std::vector<Entry>& entries, const Eigen::MatrixXd& P,
 
 Decided decide(const std::vector<Entry>& entries, const Eigen::MatrixXd& P, double shown_below,
                const std::function<std::string(const std::string&)>& motion_wanted) {
-  std::vector<bool> shown;
-  for (std::size_t i = 0; i < entries.size(); ++i) {
-    const auto k = static_cast<Eigen::Index>(i);
-    shown.push_back(std::sqrt(P(k, k)) < shown_below * entries[i].prior);
-  }
+  std::vector<bool> shown(entries.size(), true);
   Decided decided;
-  decided.covariance = refuse(entries, shown, P);
+  decided.covariance = P;
+  Split halves;
+  // What hangs on a value that stays as given may be less certain than it was before.
+  while (drop_hidden(entries, decided.covariance, shown_below, shown)) {
+    halves = split(shown, P);
+    decided.covariance = covariance_after(entries, halves, P);
+  }
+  move_back(entries, halves);
   for (std::size_t i = 0; i < entries.size(); ++i) {
     const auto k = static_cast<Eigen::Index>(i);
     const Entry& entry = entries[i];

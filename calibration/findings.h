@@ -31,8 +31,8 @@ struct Decided {
 };
 
 /// An entry whose standard deviation came to no less than `shown_below` of its prior goes back to the given value, and
-/// what hangs on it with it: the entries' values are moved. `P`: covariance of the entries as estimated;
-/// `motion_wanted`: by the name of an entry, what would show it.
+/// what hangs on it with it: the entries' values are moved. So does one that hangs on such values by so much. `P`:
+/// covariance of the entries as estimated; `motion_wanted`: by the name of an entry, what would show it.
 [[nodiscard]] Decided decide(const std::vector<Entry>& entries, const Eigen::MatrixXd& P, double shown_below,
                              const std::function<std::string(const std::string&)>& motion_wanted);
 

@@ -1,5 +1,6 @@
 #include "calibration/parameters.h"
 
+#include "calibration/findings.h"
 #include "tests/smoother/support.h"
 #include "tools/calibration/simulated_drive.h"
 
@@ -35,4 +36,26 @@ TEST_CASE("calibration: what sensor.yaml states is the prior; a sketch where it 
   CHECK(priors_of(given).wheel_radius == doctest::Approx(0.05));
   given.encoder->wheel_radius_sigma = 0.001;
   CHECK(priors_of(given).wheel_radius == doctest::Approx(0.001 / 0.075));
+}
+
+TEST_CASE("calibration: what hangs on a value that was not shown is no better known than that makes it") {
+  // Both hang together: their difference is known well, and each by what is known of the other before.
+  std::array<double, 3> values{0.3, 0.4, 0.1};
+  const std::array<const char*, 3> names{"first", "second", "third"};
+  std::vector<Entry> entries;
+  for (std::size_t i = 0; i < 3; ++i) entries.push_back({names[i], "", 1.0, 0.0, 1.0, &values[i]});
+  Eigen::Matrix3d P = Eigen::Matrix3d::Identity();
+  P.topLeftCorner<2, 2>() << 0.50, 0.485, 0.485, 0.48;  // 0.707 is kept, 0.693 by itself would not be
+  P(2, 2) = 0.01;
+  const Decided decided = decide(entries, P, 0.7, [](const std::string& name) { return "move " + name; });
+  CHECK_FALSE(decided.findings[0].shown);
+  CHECK_FALSE(decided.findings[1].shown);
+  CHECK(decided.findings[1].motion_wanted == "move second");
+  CHECK(decided.findings[2].shown);
+  CHECK(values[0] == 0.0);
+  CHECK(values[1] == 0.0);
+  CHECK(values[2] == doctest::Approx(0.1));
+  CHECK(decided.findings[1].posterior == doctest::Approx(1.0));
+  CHECK(decided.covariance(0, 1) == doctest::Approx(0.0));
+  CHECK(decided.findings[2].posterior == doctest::Approx(0.1));
 }
