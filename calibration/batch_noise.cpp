@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "calibration/batch.h"
+#include "calibration/common_slip.h"
 #include "calibration/noise_estimate.h"
 
 namespace ear::calibration {
@@ -23,11 +24,13 @@ void Batch::learn_noise() {
   const RollSetting setting{*given_.encoder, given_.imu, odometer_of(*given_.encoder),
                             odometer_of(*applied(given_, parameters_).encoder), noise_.roll};
   double slip = 0.0;
-  for (Segment& segment : segments_) {
-    renew_paths(segment, given_.imu.gyro_noise);
-    slip = std::max(slip, slip_of(segment, setting).value_or(0.0));
+  noise_.roll.common = 0.0;
+  for (std::size_t i = 0; i < segments_.size(); ++i) {
+    renew_paths(segments_[i], given_.imu.gyro_noise);
+    slip = std::max(slip, slip_of(segments_[i], setting).value_or(0.0));
+    noise_.roll.common = std::max(noise_.roll.common, common_slip(*this, i, setting).value_or(0.0));
   }
-  if (slip > 0.0) noise_.roll = {slip, 2.0 * slip};
+  if (slip > 0.0) noise_.roll = {slip, 2.0 * slip, noise_.roll.common};
 }
 
 void Batch::learn_from_pixels() {

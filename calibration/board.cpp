@@ -138,7 +138,7 @@ class Views {
 
   [[nodiscard]] std::vector<Entry> entries();
   /// Of the entries.
-  [[nodiscard]] Eigen::MatrixXd covariance();
+  [[nodiscard]] Covariances covariances();
   [[nodiscard]] Calibration calibration() const;
   [[nodiscard]] std::vector<Residual> residuals() const;
   /// Those in use, where they lie by the solution.
@@ -319,7 +319,7 @@ std::vector<Entry> Views::entries() {
   return entries;
 }
 
-Eigen::MatrixXd Views::covariance() {
+Covariances Views::covariances() {
   ceres::Problem::EvaluateOptions options;
   options.apply_loss_function = true;
   for (const CornerTerm& term : terms_) options.residual_blocks.push_back(term.id);
@@ -368,8 +368,7 @@ Eigen::MatrixXd Views::covariance() {
   const double free = rows - static_cast<double>(kPose * errors_.size()) - static_cast<double>(n);
   const double views = static_cast<double>(errors_.size());
   found *= rows / std::max(1.0, free) * views / std::max(1.0, views - 1.0);
-  const Eigen::VectorXd by = white.diagonal().cwiseQuotient(found.diagonal()).cwiseMax(1.0).cwiseSqrt();
-  return by.asDiagonal() * found * by.asDiagonal();
+  return {found, white};
 }
 
 Calibration Views::calibration() const {
@@ -446,7 +445,7 @@ BoardResult calibrate_cameras(const Calibration& start, const BoardShape& board,
                                 std::to_string(problem.root_mean_square()) + " px off");
   }
   BoardResult result;
-  Decided decided = decide(problem.entries(), problem.covariance(), kShownBelow, board_motion_that_shows);
+  Decided decided = decide(problem.entries(), problem.covariances(), kShownBelow, board_motion_that_shows);
   result.findings = std::move(decided.findings);
   result.covariance = std::move(decided.covariance);
   result.residuals = problem.residuals();

@@ -94,13 +94,13 @@ Information known(Batch& batch, const Settings& settings) {
 }
 
 /// The covariance, where need be after features were given the weight that they deserve beside the other sensors.
-Eigen::MatrixXd weighed(Batch& batch, const Settings& settings) {
+Covariances weighed(Batch& batch, const Settings& settings) {
   const Information first = known(batch, settings);
-  if (first.lasting < kLasting || settings.rounds < kWhole) return first.covariance;
+  if (first.lasting < kLasting || settings.rounds < kWhole) return first.covariances;
   batch.weigh_pixels(first.lasting);
   batch.build(kGate);
   solve(batch, settings, kNext, "weight of features");
-  return known(batch, settings).covariance;
+  return known(batch, settings).covariances;
 }
 
 }  // namespace
@@ -110,10 +110,10 @@ Result calibrate(const Calibration& given, const Priors& priors, const std::vect
   if (drives.empty()) throw std::invalid_argument("no drive to calibrate from");
   const Passed passed = pass_until_whole(given, priors, drives, settings);
   Batch& batch = *passed.batch;
-  const Eigen::MatrixXd P = weighed(batch, settings);
+  const Covariances covariances = weighed(batch, settings);
 
   Result result;
-  Decided decided = decide(all_entries(batch.parameter_blocks()), P, settings.shown_below, motion_that_shows);
+  Decided decided = decide(all_entries(batch.parameter_blocks()), covariances, settings.shown_below, motion_that_shows);
   result.covariance = std::move(decided.covariance);
   result.findings = std::move(decided.findings);
   result.before = passed.before;

@@ -30,10 +30,18 @@ struct Decided {
   Eigen::MatrixXd covariance;
 };
 
+/// Of the entries as estimated.
+struct Covariances {
+  Eigen::MatrixXd found;  ///< by the errors as they are found
+  Eigen::MatrixXd white;  ///< (J^T J)^-1, were they white and of the size assumed
+};
+
 /// An entry whose standard deviation came to no less than `shown_below` of its prior goes back to the given value, and
-/// what hangs on it with it: the entries' values are moved. `P`: covariance of the entries as estimated;
+/// what hangs on it with it: the entries' values are moved, and as uncertain as that value makes them, which may be
+/// more than before. No variance is taken to be less than white errors make it: few of them tell their size badly.
+///
 /// `motion_wanted`: by the name of an entry, what would show it.
-[[nodiscard]] Decided decide(const std::vector<Entry>& entries, const Eigen::MatrixXd& P, double shown_below,
+[[nodiscard]] Decided decide(const std::vector<Entry>& entries, const Covariances& covariances, double shown_below,
                              const std::function<std::string(const std::string&)>& motion_wanted);
 
 }  // namespace ear::calibration

@@ -64,12 +64,6 @@ double rows_over_free(const Batch& batch, double feature_rows) {
   return rows > 2.0 * kPose * keyframes ? rows / (rows - kPose * keyframes) : 2.0;
 }
 
-/// Variances to no less than these, correlations as they are: few tracks tell the size of their errors badly.
-void raise_variances(const Eigen::VectorXd& least, Eigen::MatrixXd& covariance) {
-  const Eigen::VectorXd by = least.cwiseQuotient(covariance.diagonal()).cwiseMax(1.0).cwiseSqrt();
-  covariance = (by.asDiagonal() * covariance * by.asDiagonal()).eval();
-}
-
 }  // namespace
 
 std::optional<Information> information_of(Batch& batch, int threads) {
@@ -109,8 +103,8 @@ std::optional<Information> information_of(Batch& batch, int threads) {
   end_feature();
   features *= rows_over_free(batch, feature_rows);
   Information result;
-  result.covariance = (others + features).selfadjointView<Eigen::Lower>();
-  raise_variances(columns->bottomRows(n).diagonal(), result.covariance);
+  result.covariances.found = (others + features).selfadjointView<Eigen::Lower>();
+  result.covariances.white = columns->bottomRows(n);
   double ratio = 0.0, weight = 0.0;
   for (Eigen::Index i = 0; i < n; ++i) {
     const double share = white(i) / (white(i) + others(i, i));

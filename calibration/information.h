@@ -5,13 +5,13 @@
 #include <optional>
 
 #include "calibration/batch.h"
+#include "calibration/findings.h"
 
 namespace ear::calibration {
 
 /// What is known of all parameters at the present values, in the order of Batch::parameter_blocks(), priors included.
 struct Information {
-  /// Errors of a feature's sightings are taken as they are found: of any size, and alike over its whole track.
-  Eigen::MatrixXd covariance;
+  Covariances covariances;  ///< as found: of a feature's sightings, of any size, and alike over its whole track
   /// How much larger the features make a standard deviation than errors would that are white and of the noise assumed:
   /// root of the mean over the parameters, as far as features show them. 1 where there are none.
   double lasting = 1.0;

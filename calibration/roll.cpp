@@ -64,7 +64,7 @@ Eigen::Matrix3d whitening(const RollSetting& setting, const Eigen::Vector2d& rol
   const double pitch = r * setting.imu.gyro_noise * std::sqrt(duration);
   const RollNoise& noise = setting.noise;
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
-  covariance.topLeftCorner<2, 2>().setConstant(pitch * pitch);
+  covariance.topLeftCorner<2, 2>().setConstant(pitch * pitch + noise.common * noise.common * way);
   for (int side = 0; side < 2; ++side) {
     covariance(side, side) += read * read + kFloor * kFloor + noise.slip * noise.slip * std::abs(rolled(side));
   }

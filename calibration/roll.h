@@ -14,6 +14,7 @@ namespace ear::calibration {
 struct RollNoise {
   double slip = 1e-3;       ///< of each wheel along its path [m/sqrt(m)]
   double side_slip = 2e-3;  ///< along the axle [m/sqrt(m)]
+  double common = 0.0;      ///< of both wheels alike, besides [m/sqrt(m)]
 };
 
 /// What is the same for all intervals.

@@ -13,6 +13,7 @@
 #include "calibration/allan.h"
 #include "calibration/calibrate.h"
 #include "calibration/wanted_motion.h"
+#include "src/log/log.h"
 #include "src/recording/calibration_files.h"
 #include "src/recording/calibration_writer.h"
 #include "src/recording/config_file.h"
@@ -68,9 +69,14 @@ calibration::Drive read_drive(const fs::path& path, const CalibrateArguments& ar
                     given->encoder.has_value() == recording.calibration().encoder.has_value() &&
                     given->lasers.has_value() == recording.calibration().lasers.has_value();
   if (!same) throw InputError(located(path, 0, "", "other sensors than the recording before: one vehicle at a time"));
-  return calibration::recorded_drive(recording, path.string(), config, [&](double share) {
+  calibration::Drive drive = calibration::recorded_drive(recording, path.string(), config, [&](double share) {
     progress.show(path.string() + ": " + std::to_string(static_cast<int>(100.0 * share)) + " % read");
   });
+  for (const Warning& warning : recording.warnings()) {
+    log_warning(warning.kind + ", " + std::to_string(warning.count) + " times, first at " + warning.first);
+  }
+  for (const std::string& words : calibration::ends_early(drive)) log_warning(words);
+  return drive;
 }
 
 void calibrate_drives(const CalibrateArguments& args) {

@@ -20,6 +20,7 @@
 #include "tools/program_config.h"
 #ifdef EAR_WITH_CALIBRATION
 #include "tools/calibration/live_calibration.h"
+#include "tools/calibration/recorded_drive.h"
 #include "tools/calibration/result_files.h"
 #endif
 
@@ -39,7 +40,12 @@ struct LiveArguments {
 class CalibrationRun {
  public:
   CalibrationRun(const std::filesystem::path& folder, const Calibration& calibration, const Config& config)
-      : folder_(folder), live_(calibration, settings_of(config), [](const std::string& words) { log_info(words); }) {}
+      : folder_(folder),
+        sought_(calibration::for_search(calibration)),
+        live_(calibration, settings_of(config), [](const std::string& words) { log_info(words); }) {}
+
+  /// What the session estimates by: the right camera may be further off than one that was calibrated.
+  [[nodiscard]] const Calibration& sought() const { return sought_; }
 
   [[nodiscard]] live::Onlooker onlooker() {
     return {live_.make(), {}, [this](const live::LiveFrame&, const Odometry&) { live_.hand_over(); }};
@@ -59,6 +65,7 @@ class CalibrationRun {
   }
 
   std::filesystem::path folder_;
+  Calibration sought_;
   calibration::LiveCalibration live_;
 };
 #else
@@ -67,6 +74,7 @@ class CalibrationRun {
   CalibrationRun(const std::filesystem::path&, const Calibration&, const Config&) {
     throw InputError("--calibrate: this program was built without Ceres (Debian: libceres-dev)");
   }
+  [[nodiscard]] static Calibration sought() { return {}; }
   [[nodiscard]] static live::Onlooker onlooker() { return {}; }
   static void finish() {}
 };
@@ -144,7 +152,8 @@ void run_live(const LiveArguments& args) {
   if (args.view.port >= 0) view.emplace(args.view, title_of(args), files.read());
   std::optional<CalibrationRun> calibrates;
   if (!args.calibrate.empty()) calibrates.emplace(args.calibrate, files.read(), settings.estimator);
-  live::Session session(args.session, settings, files.read(), files.folder(), ros.get(), player.get(),
+  live::Session session(args.session, settings, calibrates ? calibrates->sought() : files.read(), files.folder(),
+                        ros.get(), player.get(),
                         view         ? view->onlooker()
                         : calibrates ? calibrates->onlooker()
                                      : live::Onlooker{});

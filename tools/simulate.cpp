@@ -34,7 +34,8 @@ void simulate(const SimulateArguments& args) {
   for (const std::string& fault : args.faults) options.faults.push_back(simulator::parse_fault(fault));
   const simulator::Simulation simulation(options);
   if (!args.images_from.empty()) simulator::require_same_pictures(simulation, args.images_from);
-  simulator::write_recording(simulation, args.out);
+  simulator::write_recording(simulation, args.out,
+                             args.no_images ? simulator::WithCameras::no : simulator::WithCameras::yes);
 
   std::vector<simulator::Shot> pictures;
   if (!args.images_from.empty()) {
@@ -84,7 +85,8 @@ void add_simulate_command(CLI::App& app) {
           "--perfect-calibration", [args] { args->options.calibration_error = 0.0; }, "--calibration-error 0")
       ->excludes(calibration_error);
   command->add_option("--fault", args->faults, "what goes wrong, as NAME@START+DURATION (below); may be repeated");
-  CLI::Option* no_images = command->add_flag("--no-images", args->no_images, "everything but the pictures");
+  CLI::Option* no_images =
+      command->add_flag("--no-images", args->no_images, "no cameras: everything but their folders");
   command
       ->add_option("--images-from", args->images_from,
                    "link the pictures of this recording of the same simulation; faulty ones are rendered")

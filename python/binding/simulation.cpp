@@ -89,7 +89,7 @@ void write(const Simulation& simulation, py::handle folder, bool images, int thr
   const std::filesystem::path where = path_from(folder, "folder");
   if (threads < 1) throw py::value_error("threads: expected at least 1, got " + std::to_string(threads));
   const py::gil_scoped_release released;
-  simulator::write_recording(simulation, where);
+  simulator::write_recording(simulation, where, images ? simulator::WithCameras::yes : simulator::WithCameras::no);
   if (images) {
     simulator::render_images(simulation, simulator::all_pictures(simulation), where, threads,
                              [](std::size_t, std::size_t) {});
@@ -128,7 +128,7 @@ void bind_simulation(py::module_& module) {
       .def_property_readonly("truth", &truth, "t_ns (n,), p_WB (n, 3), q_WB (n, 4) and v_W (n, 3) as arrays.")
       .def("write", &write, arg("folder"), arg("images") = true,
            arg("threads") = static_cast<int>(std::max(1U, std::thread::hardware_concurrency())),
-           "Writes it as a recording, with rendered images unless they are not wanted.")
+           "Writes it as a recording, with rendered images, or without cameras where they are not wanted.")
       .def("__repr__", [](const Simulation& self) {
         return "<Simulation " + self.options().sequence + " seed " + std::to_string(self.options().seed) + ">";
       });

@@ -1,5 +1,6 @@
 #include "calibration/parameters.h"
 
+#include "calibration/findings.h"
 #include "tests/smoother/support.h"
 #include "tools/calibration/simulated_drive.h"
 
@@ -35,4 +36,28 @@ TEST_CASE("calibration: what sensor.yaml states is the prior; a sketch where it 
   CHECK(priors_of(given).wheel_radius == doctest::Approx(0.05));
   given.encoder->wheel_radius_sigma = 0.001;
   CHECK(priors_of(given).wheel_radius == doctest::Approx(0.001 / 0.075));
+}
+
+TEST_CASE("calibration: what hangs on a value that was not shown moves with it, and is as uncertain as that makes it") {
+  std::array<double, 3> values{0.3, 0.4, 0.1};
+  const std::array<const char*, 3> names{"first", "second", "third"};
+  std::vector<Entry> entries;
+  for (std::size_t i = 0; i < 3; ++i) entries.push_back({names[i], "", 1.0, 0.0, 1.0, &values[i]});
+  Covariances before{Eigen::Matrix3d::Identity(), Eigen::Matrix3d::Identity()};
+  before.white.topLeftCorner<2, 2>() << 0.8, 0.4, 0.4, 0.3;  // the second moves by half of what the first does
+  before.found.topLeftCorner<2, 2>() << 0.8, 0.2, 0.2, 0.3;
+  before.white(2, 2) = 0.04;
+  before.found(2, 2) = 0.01;  // no less than white errors make it
+  const Decided decided = decide(entries, before, 0.7, [](const std::string& name) { return "move " + name; });
+  CHECK_FALSE(decided.findings[0].shown);
+  CHECK(decided.findings[0].motion_wanted == "move first");
+  CHECK(decided.findings[0].posterior == doctest::Approx(1.0));
+  CHECK(values[0] == 0.0);
+  CHECK(decided.findings[1].shown);
+  CHECK(values[1] == doctest::Approx(0.25));
+  // Of e2 - e1 / 2 by the errors found, and a quarter of the first one's prior.
+  CHECK(decided.covariance(1, 1) == doctest::Approx(0.3 - 0.2 + 0.25 * 0.8 + 0.25));
+  CHECK(decided.covariance(0, 1) == doctest::Approx(0.5));
+  CHECK(values[2] == doctest::Approx(0.1));
+  CHECK(decided.findings[2].posterior == doctest::Approx(0.2));
 }

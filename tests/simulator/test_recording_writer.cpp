@@ -138,6 +138,17 @@ TEST_CASE("recording: truth rows follow EuRoC's order") {
   CHECK(lines_of(folder / "r/mav0/truth_extra.csv").size() == lines.size());
 }
 
+TEST_CASE("recording: without cameras it is one of wheels, beams and IMU") {
+  const TemporaryFolder folder;
+  write_recording(Simulation(short_drive(45)), folder / "r", WithCameras::no);
+  CHECK_FALSE(std::filesystem::exists(folder / "r/mav0/cam0"));
+  CHECK_FALSE(std::filesystem::exists(folder / "r/mav0/cam1"));
+  ear::Recording recording(folder / "r");
+  CHECK(recording.calibration().cameras.empty());
+  CHECK(recording.calibration().encoder);
+  CHECK(recording.calibration().lasers);
+}
+
 TEST_CASE("recording: what is there already is not mixed with something else") {
   const TemporaryFolder folder;
   write_recording(Simulation(short_drive(43)), folder / "r");

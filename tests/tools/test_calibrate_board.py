@@ -123,8 +123,6 @@ class Live(unittest.TestCase):
             root = Path(folder)
             made = run("simulate", "flat1", "--no-images", "--duration", "9", "--out", root / "drive")
             self.assertEqual(made.returncode, 0, made.stderr)
-            for camera in ("cam0", "cam1"):
-                shutil.rmtree(root / "drive/mav0" / camera)
             done = run("live", "--sensors", root / "drive", "--calibrate", root / "found", "--out", root / "live")
             self.assertEqual(done.returncode, 0, done.stderr)
             self.assertIn("calibration: the whole estimate", done.stderr)
@@ -140,6 +138,65 @@ class Live(unittest.TestCase):
         done = run("live", "--sensors", "/", "--calibrate", "x", "--check")
         self.assertNotEqual(done.returncode, 0)
         self.assertIn("--check", done.stderr)
+
+
+class Rendered(unittest.TestCase):
+    """A short drive with two cameras."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory()
+        cls.root = Path(cls.folder.name)
+        cls.drive = cls.root / "drive"
+        made = run("simulate", "flat1", "--seed", "4", "--duration", "9", "--camera-rate", "6", "--out", cls.drive)
+        assert made.returncode == 0, made.stderr
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.folder.cleanup()
+
+    def copy(self, name):
+        shutil.copytree(self.drive, self.root / name)
+        return self.root / name
+
+    def test_right_camera_that_is_off_its_epipolar_lines(self):
+        """By 5 px: more than the front end allows a pair that was calibrated."""
+        off = 5.0
+        drive = self.copy("off")
+        file = drive / "mav0/cam1/sensor.yaml"
+        text = file.read_text(encoding="utf-8")
+        cv = f"{TRUTH['cam1: principal point v']:.6f}]"
+        self.assertIn(cv, text)
+        file.write_text(text.replace(cv, f"{TRUTH['cam1: principal point v'] + off:.6f}]"), encoding="utf-8")
+        done = run("live", "--sensors", drive, "--calibrate", self.root / "found")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        found = json.loads((self.root / "found/calibration.json").read_text(encoding="utf-8"))
+        entries = {entry["name"]: entry for entry in found["parameters"]}
+        left, right = (entries[f"cam{i}: principal point v"] for i in (0, 1))
+        self.assertTrue(right["shown"])
+        self.assertLess(abs(right["change"] - left["change"] + off), 0.5)
+
+    def test_images_of_left_and_right_exchanged(self):
+        mav0 = self.copy("exchanged") / "mav0"
+        (mav0 / "cam0/data").rename(mav0 / "left")
+        (mav0 / "cam1/data").rename(mav0 / "cam0/data")
+        (mav0 / "left").rename(mav0 / "cam1/data")
+        done = run("calibrate", mav0.parent, "--out", self.root / "none")
+        self.assertNotEqual(done.returncode, 0)
+        self.assertIn("left and right are swapped", done.stderr)
+        self.assertFalse((self.root / "none").exists())
+
+    def test_torn_files(self):
+        mav0 = self.copy("torn") / "mav0"
+        images = mav0 / "cam1/data.csv"
+        images.write_bytes(images.read_bytes()[:300])
+        readings = mav0 / "encoder0/data.csv"
+        readings.write_bytes(readings.read_bytes()[:7000])
+        done = run("calibrate", mav0.parent, "--out", self.root / "rest")
+        self.assertEqual(done.returncode, 0, done.stderr)  # the left camera goes on
+        self.assertIn("torn last line", done.stderr)
+        for sensor in ("cam1", "encoder0"):
+            self.assertRegex(done.stderr, sensor + " ends [0-9] s before other sensors")
 
 
 if __name__ == "__main__":

@@ -76,6 +76,21 @@ std::string yaml_line(const char* key, const std::optional<double>& value) {
   return line("# %s: cannot be told from this length\n", key);
 }
 
+/// Of the sensors that are there.
+std::string noise_text(const Calibration& calibration, const Noise& noise) {
+  std::string text;
+  const auto add = [&](const std::string& of) { text += (text.empty() ? "noise found: " : ", ") + of; };
+  if (!calibration.cameras.empty()) add(line("features %.2f px", noise.pixel));
+  if (calibration.encoder) add(line("slip %.2g m/sqrt(m)", noise.roll.slip));
+  if (calibration.lasers) add(line("beams %.2g m", noise.beam));
+  if (!text.empty()) text += "\n";
+  if (noise.roll.common > 0.0) {
+    text += line("both wheels alike slip by %.2g m/sqrt(m) against the reference, or it drifts by that\n",
+                 noise.roll.common);
+  }
+  return text;
+}
+
 }  // namespace
 
 std::string to_text(const Result& result) {
@@ -89,19 +104,21 @@ std::string to_text(const Result& result) {
   }
   if (std::abs(result.encoder_time) > 1e-3) text += clock_line("encoder0", result.encoder_time);
   if (std::abs(result.laser_time) > 1e-3) text += clock_line("laser0", result.laser_time);
-  text += line("noise found: features %.2f px, slip %.2g m/sqrt(m), beams %.2g m\n", result.noise.pixel,
-               result.noise.roll.slip, result.noise.beam);
+  text += noise_text(result.calibration, result.noise);
   if (result.left_out > 0.0) text += line("%.1f s of the drives were left out: no estimate there\n", result.left_out);
   return text;
 }
 
 std::string to_json(const Result& result) {
-  const Json json{
-      {"parameters", json_of(result.findings)},
-      {"noise", {{"feature_px", result.noise.pixel}, {"slip", result.noise.roll.slip}, {"beam", result.noise.beam}}},
-      {"encoder_time_offset", result.encoder_time},
-      {"laser_time_offset", result.laser_time},
-      {"left_out_s", result.left_out}};
+  const Json json{{"parameters", json_of(result.findings)},
+                  {"noise",
+                   {{"feature_px", result.noise.pixel},
+                    {"slip", result.noise.roll.slip},
+                    {"common_slip", result.noise.roll.common},
+                    {"beam", result.noise.beam}}},
+                  {"encoder_time_offset", result.encoder_time},
+                  {"laser_time_offset", result.laser_time},
+                  {"left_out_s", result.left_out}};
   return json.dump(1) + "\n";
 }
 

@@ -11,6 +11,7 @@
 #include <opencv2/aruco/charuco.hpp>
 #endif
 
+#include "tools/simulator/camera_pose.h"
 #include "tools/simulator/constants.h"
 
 namespace ear::simulator {
@@ -31,12 +32,7 @@ double smooth(double share) {
 }  // namespace
 
 HeldBoard::HeldBoard(const BoardShow& show, const Trajectory& trajectory, const CameraCalibration& camera, Rng& rng)
-    : show_(show), T_WC_(Eigen::Isometry3d::Identity()) {
-  const Kinematics motion = trajectory.at(0.5 * (show.begin + show.end));
-  T_WC_.linear() = motion.R_WB;
-  T_WC_.translation() = motion.p_WB;
-  T_WC_ = T_WC_ * camera.T_BC;
-
+    : show_(show), T_WC_(camera_pose(trajectory.at(0.5 * (show.begin + show.end)), camera.T_BC)) {
   const int count = static_cast<int>(std::ceil((show.end - show.begin) / kPerPlace)) + 1;
   for (int i = 0; i < count; ++i) {
     const double depth = std::array{0.34, 0.48, 0.62}[static_cast<std::size_t>(i / 9 % 3)] * uniform(rng, 0.9, 1.1);

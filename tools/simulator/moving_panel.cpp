@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 
+#include "tools/simulator/camera_pose.h"
 #include "tools/simulator/lens.h"
 
 namespace ear::simulator {
@@ -15,14 +16,6 @@ struct Instant {
 };
 constexpr std::array<Instant, 5> kInstants{
     {{-0.4, 0.2, -0.4}, {-0.2, -0.4, 0.0}, {0.0, 0.0, 0.4}, {0.2, 0.4, -0.2}, {0.4, -0.2, 0.2}}};
-
-Eigen::Isometry3d pose_of(const Trajectory& trajectory, double t, const CameraCalibration& camera) {
-  const Kinematics motion = trajectory.at(t);
-  Eigen::Isometry3d T_WB = Eigen::Isometry3d::Identity();
-  T_WB.linear() = motion.R_WB;
-  T_WB.translation() = motion.p_WB;
-  return T_WB * camera.T_BC;
-}
 
 // The panel at one instant as a camera sees it: the ray d = (x, y, 1) meets it at inverse depth m . d.
 struct View {
@@ -67,10 +60,10 @@ void draw_moving_panel(const PanelMotion& panel_at, const Texture& texture, cons
   std::array<View, kInstants.size()> views;
   for (std::size_t i = 0; i < kInstants.size(); ++i) {
     const double instant = t + kInstants[i].late * exposure.seconds;
-    views[i] = view_of(panel_at(instant), pose_of(trajectory, instant, camera));
+    views[i] = view_of(panel_at(instant), camera_pose(trajectory.at(instant), camera.T_BC));
   }
   const Panel middle = panel_at(t);
-  const cv::Rect area = bounds(middle, pose_of(trajectory, t, camera), camera);
+  const cv::Rect area = bounds(middle, camera_pose(trajectory.at(t), camera.T_BC), camera);
   for (int row = area.y; row < area.y + area.height; ++row) {
     for (int column = area.x; column < area.x + area.width; ++column) {
       const Eigen::Vector2d ray = to_ray(camera, Eigen::Vector2d(column, row));

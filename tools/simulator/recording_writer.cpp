@@ -224,13 +224,15 @@ void write_origin(const Simulation& simulation, const fs::path& directory) {
 
 }  // namespace
 
-void write_recording(const Simulation& simulation, const fs::path& directory) {
+void write_recording(const Simulation& simulation, const fs::path& directory, WithCameras cameras) {
   const fs::path mav0 = directory / "mav0";
   if (fs::exists(mav0)) throw std::runtime_error(mav0.string() + ": there is a recording already");
-  for (std::size_t i = 0; i < simulation.calibration().cameras.size(); ++i) {
-    write_camera(simulation, mav0 / ("cam" + std::to_string(i)), i);
+  if (cameras == WithCameras::yes) {
+    for (std::size_t i = 0; i < simulation.calibration().cameras.size(); ++i) {
+      write_camera(simulation, mav0 / ("cam" + std::to_string(i)), i);
+    }
+    write_arrivals(simulation, mav0 / "cam0" / "arrival.csv");
   }
-  write_arrivals(simulation, mav0 / "cam0" / "arrival.csv");
   write_imu(simulation, mav0 / "imu0");
   write_encoder(simulation, mav0 / "encoder0");
   write_lasers(simulation, mav0 / "laser0");

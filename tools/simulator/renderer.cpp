@@ -8,6 +8,7 @@
 #include <string>
 #include <utility>
 
+#include "tools/simulator/camera_pose.h"
 #include "tools/simulator/lanes.h"
 
 namespace ear::simulator {
@@ -99,10 +100,7 @@ cv::Mat Renderer::render(std::size_t camera, const Trajectory& trajectory, doubl
   std::vector<View> views;
   for (std::size_t sub = 0; sub < kPattern.size(); ++sub) {
     const Kinematics motion = trajectory.at(t + fraction(kPattern[sub].late) * exposure.seconds);
-    Eigen::Isometry3d T_WB = Eigen::Isometry3d::Identity();
-    T_WB.linear() = motion.R_WB;
-    T_WB.translation() = motion.p_WB;
-    views.push_back(look(eye, T_WB * eye.T_BC, sub));
+    views.push_back(look(eye, camera_pose(motion, eye.T_BC), sub));
   }
 
   const auto gain = static_cast<float>(exposure.gain / kSubPictures);

@@ -9,6 +9,7 @@
 #include <unordered_map>
 #include <utility>
 
+#include "tools/simulator/camera_pose.h"
 #include "tools/simulator/lens.h"
 #include "tools/simulator/sensors.h"
 
@@ -52,14 +53,6 @@ std::vector<FeatureObservation> join(const Eyes& eyes) {
   return features;
 }
 
-Eigen::Isometry3d pose_of(const Trajectory& trajectory, double t, const CameraCalibration& camera) {
-  const Kinematics motion = trajectory.at(t);
-  Eigen::Isometry3d T_WB = Eigen::Isometry3d::Identity();
-  T_WB.linear() = motion.R_WB;
-  T_WB.translation() = motion.p_WB;
-  return T_WB * camera.T_BC;
-}
-
 void remove_if(Eye& eye, const std::function<bool(const Seen&)>& lost) {
   eye.erase(std::remove_if(eye.begin(), eye.end(), lost), eye.end());
 }
@@ -80,8 +73,8 @@ Eigen::Vector2d noisy(const CameraCalibration& camera, const Eigen::Vector2d& ra
 void move_eyes(Eyes& eyes, const TrackFaults& setting, const std::vector<Eigen::Vector3d>& points_W, double t) {
   for (std::size_t c = 0; c < 2; ++c) {
     const CameraCalibration& camera = setting.cameras[c];
-    const Eigen::Isometry3d clean_T_CW = pose_of(setting.clean_motion, t, camera).inverse();
-    const Eigen::Isometry3d T_CW = pose_of(setting.motion, t, camera).inverse();
+    const Eigen::Isometry3d clean_T_CW = camera_pose(setting.clean_motion.at(t), camera.T_BC).inverse();
+    const Eigen::Isometry3d T_CW = camera_pose(setting.motion.at(t), camera.T_BC).inverse();
     if ((clean_T_CW.matrix() - T_CW.matrix()).norm() < kSamePlace) continue;
     Eye moved;
     for (const Seen& seen : eyes[c]) {
@@ -111,7 +104,7 @@ class PeopleTracks {
     const Panel panel = passerby_.panel(t);
     for (std::size_t c = 0; c < 2; ++c) {
       const CameraCalibration& camera = setting.cameras[c];
-      const Eigen::Isometry3d T_WC = pose_of(setting.motion, t, camera);
+      const Eigen::Isometry3d T_WC = camera_pose(setting.motion.at(t), camera.T_BC);
       remove_if(eyes[c], [&](const Seen& seen) {
         // Other people cross each other's way unhindered.
         return seen.id <= points_W.size() && hides(panel, T_WC.translation(), points_W[seen.id - 1]);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tools/simulator/camera_pose.h"
 #include "tools/simulator/lens.h"
 #include "tools/simulator/sensors.h"
 
@@ -20,13 +21,6 @@ struct Landmark {
   Eigen::Vector3d p_W;
   Eigen::Vector2d pixel;  // in the left picture
 };
-
-Eigen::Isometry3d pose_of(const Kinematics& motion, const CameraCalibration& camera) {
-  Eigen::Isometry3d T_WB = Eigen::Isometry3d::Identity();
-  T_WB.linear() = motion.R_WB;
-  T_WB.translation() = motion.p_WB;
-  return T_WB * camera.T_BC;
-}
 
 // One camera at one instant.
 struct View {
@@ -101,7 +95,7 @@ Tracks generate_tracks(const Scene& scene, const Trajectory& trajectory, const s
   TimeNs previous_ns = stamps.empty() ? 0 : stamps.front();
   for (const TimeNs t_ns : stamps) {
     const Kinematics motion = trajectory.at(motion_time(t_ns));
-    const View left_view{scene, left, pose_of(motion, left), obstruction, 0, motion_time(t_ns)};
+    const View left_view{scene, left, camera_pose(motion, left.T_BC), obstruction, 0, motion_time(t_ns)};
 
     const double loss = 1.0 - std::exp(-seconds_between(previous_ns, t_ns) / options.mean_life);
     previous_ns = t_ns;
@@ -120,7 +114,7 @@ Tracks generate_tracks(const Scene& scene, const Trajectory& trajectory, const s
       seen.id = landmark.id;
       seen.left = measure(left, landmark.pixel, options.sigma_px, rng);
       if (cameras.size() > 1) {
-        const View right_view{scene, cameras[1], pose_of(motion, cameras[1]), obstruction, 1, left_view.t};
+        const View right_view{scene, cameras[1], camera_pose(motion, cameras[1].T_BC), obstruction, 1, left_view.t};
         if (const auto pixel = see(right_view, landmark.p_W)) {
           seen.right = measure(cameras[1], *pixel, options.sigma_px, rng);
           seen.has_right = true;
