@@ -27,7 +27,7 @@ struct PriorConfig {
   double accel_bias = 0.05;         ///< [m/s^2]
   double camera_rotation = 2.5e-3;  ///< [rad] camera 0 in the body, where it is estimated
   double camera_position = 1e-3;    ///< [m]
-  double stereo_rotation = 2e-3;    ///< [rad] camera 1 in camera 0, the error of its principal point included
+  double stereo_rotation = 2e-3;    ///< [rad] camera 1 in camera 0: rigs bend
   double stereo_position = 5e-5;    ///< [m]
   double focal_length = 1e-3;       ///< of each camera, relative
   double principal_point = 0.5;     ///< [px] of each camera, each axis
