@@ -113,15 +113,16 @@ bool Cameras::bridge(const FeatureFrame& frame, Ekf& ekf) {
   return true;
 }
 
-/// How fast the errors of the cameras' mounting and of their time offset make the vehicle seem to turn otherwise than
-/// the gyroscope measures, with the last image `dt` ago [rad/s].
+/// How fast the errors of the cameras' mounting, focal length and time offset make the vehicle seem to turn otherwise
+/// than the gyroscope measures, with the last image `dt` ago [rad/s].
 double Cameras::apparent_rate(double dt, const Ekf& ekf) const {
   const auto P = ekf.covariance().matrix();
   const double mounting = P.diagonal().segment<3>(err::camera).cwiseMax(0.0).maxCoeff();
+  const double focal = std::max(0.0, P(err::lens(0), err::lens(0)));
   const double offset = std::max(0.0, P(err::time_offset, err::time_offset));
   const Eigen::Vector3d& rate_B = ekf.rate_B();
   const double acceleration = (rate_B - last_->rate_B).norm() / dt;
-  return kApparent * std::sqrt(rate_B.squaredNorm() * mounting + acceleration * acceleration * offset);
+  return kApparent * std::sqrt(rate_B.squaredNorm() * (mounting + focal) + acceleration * acceleration * offset);
 }
 
 FrameAgreement Cameras::compare(const FeatureFrame& frame, const Ekf& ekf) {
