@@ -3,7 +3,7 @@
 //
 // What happens to a frame is Filter::process, in filter.cpp: read that first. The parts:
 //   ingest/    samples become usable: clocks, plausibility, buffers, quality of the inertial samples
-//   ekf/       the state and its covariance: propagate, apply (the gate), clone, marginalise
+//   ekf/       the state and its covariance: propagate, test (the gate), apply, clone, marginalise
 //   kernels/   its sums over many rows, for each vector unit with the same bits
 //   sources/   cameras, wheels, ground, standstill: each turns samples into linearised measurements
 //   start/     standing, rolling, moving: where it begins

@@ -58,7 +58,7 @@ void MovingStart::add(TimeNs t_ns, const FeatureFrame& frame, const ImuBuffer& i
     start.R_B0B1 = gyro_rotation(last.t_ns, t_ns, Eigen::Vector3d::Zero(), imu);
     const double dt = seconds_between(last.t_ns, t_ns);
     start.p_B0B1 = path_to(t_ns).value_or(Eigen::Vector3d::Zero());
-    const std::optional<StereoMotion> motion = stereo_motion(matches, cameras, start, noise_.feature);
+    const std::optional<StereoMotion> motion = stereo_motion(matches, cameras, start, feature_sigma_);
     if (motion && dt < kLongestStep && !frozen(matches)) {
       next.motion = *motion;
     } else {
@@ -81,7 +81,7 @@ std::optional<Eigen::Vector3d> MovingStart::path_to(TimeNs t_ns) const {
 
 /// What turns the gyroscope's rotation into that of the cameras.
 Eigen::Vector3d MovingStart::gyro_bias(const ImuBuffer& imu) const {
-  double weight = 1.0 / (noise_.gyro_bias * noise_.gyro_bias);
+  double weight = 1.0 / (prior_.gyro_bias * prior_.gyro_bias);
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (std::size_t k = 1; k < frames_.size(); ++k) {
     const double dt = seconds_between(frames_[k - 1].t_ns, frames_[k].t_ns);
@@ -102,7 +102,7 @@ std::optional<ImuState> MovingStart::solve(const ImuBuffer& imu) const {
   const Eigen::Vector3d b_g = gyro_bias(imu);
   const TimeNs start_ns = frames_.front().t_ns;
   Fit fit;
-  fit.expect(Fit::accel_bias, noise_.accel_bias);
+  fit.expect(Fit::accel_bias, prior_.accel_bias);
   Sums sums;
   for (std::size_t k = 1; k < frames_.size(); ++k) {
     const TimeNs from_ns = frames_[k - 1].t_ns;

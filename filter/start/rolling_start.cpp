@@ -46,11 +46,11 @@ Reason lacking_for_rolling_start(const ImuBuffer& imu, const Ring<WheelIncrement
 }
 
 std::optional<ImuState> rolling_start(const ImuBuffer& imu, const Ring<WheelIncrement>& turns,
-                                      const OdometerState& odometer, const RollingStartNoise& noise) {
+                                      const OdometerState& odometer, const PriorConfig& prior, double stamp_sigma) {
   const TimeNs start_ns = turns.front().from_ns;
   Fit fit;
-  fit.expect(Fit::gyro_bias, noise.gyro_bias);
-  fit.expect(Fit::accel_bias, noise.accel_bias);
+  fit.expect(Fit::gyro_bias, prior.gyro_bias);
+  fit.expect(Fit::accel_bias, prior.accel_bias);
   Sums sums;
   TimeNs now_ns = start_ns;
   for (std::size_t k = 0; k < turns.size(); ++k) {
@@ -73,7 +73,7 @@ std::optional<ImuState> rolling_start(const ImuBuffer& imu, const Ring<WheelIncr
     H.middleCols<3>(Fit::gyro_bias) = sums.gained_by_b_g - skew(u) * sums.R_integral;
     H.middleCols<3>(Fit::accel_bias) = -sums.R_integral;
     const Eigen::Vector3d z = u - sums.gained;
-    const double direction = std::hypot(kDirectionSigma, std::sqrt(2.0) * noise.stamp / turn.duration());
+    const double direction = std::hypot(kDirectionSigma, std::sqrt(2.0) * stamp_sigma / turn.duration());
     const double sigma = std::hypot(kSpeedSigma, direction * speed);
     fit.add(H, z, sigma * sigma);
   }
