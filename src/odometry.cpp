@@ -16,8 +16,6 @@
 namespace ear {
 namespace {
 
-constexpr double kFrameGap = 0.25;  // [s] between two frames: a gap
-
 MotionPrediction to_prediction(const std::optional<RelativeMotion>& motion) {
   MotionPrediction prediction;
   if (!motion) return prediction;
@@ -199,7 +197,7 @@ class Odometry::Impl {
   }
 
   void note_frame(TimeNs t_ns) {
-    if (last_frame_ns_ && seconds_between(*last_frame_ns_, t_ns) > kFrameGap) ++camera_.gaps;
+    if (last_frame_ns_ && seconds_between(*last_frame_ns_, t_ns) > kStreamGap) ++camera_.gaps;
     last_frame_ns_ = t_ns;
     ++camera_.accepted;
   }

@@ -7,11 +7,6 @@
 namespace ear {
 namespace {
 
-constexpr int kDimensions = 3;
-constexpr std::size_t kImu = index_of(MotionSensor::imu);
-constexpr std::size_t kOdometer = index_of(MotionSensor::odometer);
-constexpr std::size_t kCamera = index_of(MotionSensor::camera);
-
 /// Distances between the displacements, each named by the sensor that it does not concern.
 using Distances = std::array<double, kMotionSensors>;
 
@@ -21,6 +16,9 @@ double distance_between(const Displacement& x, const Displacement& y, AnomalySco
   const Eigen::Matrix3d S = x.covariance + y.covariance;
   return std::sqrt(std::max(0.0, difference.dot(S.ldlt().solve(difference))));
 }
+
+/// Of so many displacements against one that is common to all.
+constexpr int degrees_of_freedom(std::size_t count) { return 3 * static_cast<int>(count - 1); }
 
 /// (13) [m^2], over the displacements there are.
 double variance_of(const Displacements& displacements, int count) {
@@ -35,8 +33,7 @@ double variance_of(const Displacements& displacements, int count) {
   return variance;
 }
 
-/// The least sum of squared normalized distances from one common displacement: chi-squared, with three degrees of
-/// freedom for every displacement but one.
+/// The least sum of squared normalized distances from one common displacement.
 double chi_squared_of(const Displacements& displacements) {
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
   Eigen::Vector3d weighted = Eigen::Vector3d::Zero();
@@ -54,12 +51,12 @@ double chi_squared_of(const Displacements& displacements) {
 
 /// (15), before it is limited. Design note: what is printed gives each sensor a formula of its own.
 double weight_of(std::size_t sensor, const Distances& between_others, AnomalyWeight form) {
-  const double IO = between_others[kCamera];
-  const double IC = between_others[kOdometer];
-  const double OC = between_others[kImu];
   if (form == AnomalyWeight::printed) {
-    if (sensor == kImu) return 0.5 * (OC / IO + IC / IC);
-    if (sensor == kOdometer) return 0.5 * (IC / IO + IO / OC);
+    const double IO = between_others[index_of(MotionSensor::camera)];
+    const double IC = between_others[index_of(MotionSensor::odometer)];
+    const double OC = between_others[index_of(MotionSensor::imu)];
+    if (sensor == index_of(MotionSensor::imu)) return 0.5 * (OC / IO + IC / IC);
+    if (sensor == index_of(MotionSensor::odometer)) return 0.5 * (IC / IO + IO / OC);
     return 0.5 * (OC / IC + IO / IC);
   }
   const double others = between_others[sensor];
@@ -71,7 +68,7 @@ double weight_of(std::size_t sensor, const Distances& between_others, AnomalyWei
 }  // namespace
 
 ConsistencyCheck::ConsistencyCheck(const AnomalyConfig& config)
-    : config_(config), gate_(1.0 - config.false_alarm, kDimensions * static_cast<int>(kMotionSensors - 1)) {}
+    : config_(config), gate_(1.0 - config.false_alarm, degrees_of_freedom(kMotionSensors)) {}
 
 Consistency ConsistencyCheck::operator()(const Displacements& displacements) const {
   Consistency result;
@@ -99,7 +96,7 @@ Consistency ConsistencyCheck::operator()(const Displacements& displacements) con
     result.threshold = config_.distance;
   } else {
     result.score = std::sqrt(chi_squared_of(displacements));
-    result.threshold = std::sqrt(gate_.quantile(kDimensions * (count - 1)));
+    result.threshold = std::sqrt(gate_.quantile(degrees_of_freedom(static_cast<std::size_t>(count))));
   }
   if (count < static_cast<int>(kMotionSensors) || !result.disagree()) return result;
 

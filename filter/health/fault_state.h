@@ -9,8 +9,6 @@ namespace ear {
 
 /// Of what a sensor measured: more of it is wrong, and so is the sensor.
 inline constexpr double kMajority = 0.5;
-/// [s] chosen: what came before shows nothing of now.
-inline constexpr double kStale = 0.5;
 
 /// How long a source may be silent [s] that usually delivers every `interval` seconds; 0: not known.
 [[nodiscard]] double longest_silence(double interval);

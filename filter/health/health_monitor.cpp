@@ -15,9 +15,8 @@ constexpr double kPrecise = 0.05;        // of the path: two standard deviations
 constexpr double kPreciseEnough = 0.1;   // [m] or this, if more
 constexpr double kFastest = 100.0;       // [m/s] chosen: no vehicle with wheels and rotors is faster
 
-constexpr int kFullQuality = 100;  // of a vehicle that stands; Health::quality
-constexpr int kWheelQuality = 40;
-constexpr int kTrackQuality = 2;  // for each feature
+constexpr int kWheelQuality = 40;  // of 100; Health::quality
+constexpr int kTrackQuality = 2;   // for each feature
 constexpr int kInertialQuality = 10;
 constexpr int kDegradedQuality = 60;  // at most, where a sensor is missing
 
@@ -63,9 +62,9 @@ void HealthMonitor::add_imu(const ImuSample& sample, double max_gap) {
   note_silence(t_ns);
 }
 
-void HealthMonitor::report_imu_fault(bool gyro, bool accel, TimeNs t_ns) {
-  if (gyro) report({Source::gyroscope}, t_ns);
-  if (accel) report({Source::accelerometer}, t_ns);
+void HealthMonitor::report_imu_fault(const ImuFault& fault, TimeNs t_ns) {
+  if (fault.gyro) report({Source::gyroscope}, t_ns);
+  if (fault.accel) report({Source::accelerometer}, t_ns);
 }
 
 void HealthMonitor::report_camera_fault(TimeNs t_ns) {
@@ -239,7 +238,7 @@ int HealthMonitor::quality(const Frame& frame) const {
   int points = 0;
   switch (health_.aiding) {
     case Aiding::standing:
-      points = kFullQuality;
+      points = 100;
       break;
     case Aiding::cameras_and_wheels:
       points = kWheelQuality + kTrackQuality * frame.statistics.tracks;
@@ -254,7 +253,7 @@ int HealthMonitor::quality(const Frame& frame) const {
       points = kInertialQuality;
       break;
   }
-  return std::clamp(points, 1, health_.status == HealthStatus::degraded ? kDegradedQuality : kFullQuality);
+  return std::clamp(points, 1, health_.status == HealthStatus::degraded ? kDegradedQuality : 100);
 }
 
 }  // namespace ear

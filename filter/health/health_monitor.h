@@ -14,6 +14,7 @@
 #include "filter/health/image_health.h"
 #include "filter/health/rotation_check.h"
 #include "filter/ingest/beam_ranges.h"
+#include "filter/ingest/imu_spike.h"
 #include "filter/ingest/input_guard.h"
 
 namespace ear {
@@ -30,7 +31,7 @@ class HealthMonitor {
   /// One whose stamp or values cannot be.
   void add_refused_imu();
   /// What only a fault of the sensor does: a spike, a clipped value, a bias that jumps.
-  void report_imu_fault(bool gyro, bool accel, TimeNs t_ns);
+  void report_imu_fault(const ImuFault& fault, TimeNs t_ns);
   void report_camera_fault(TimeNs t_ns);
   /// A reading, used or refused, and the stamp of the newest inertial sample. `stuck`: beams that give the same range
   /// again and again.

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "filter/ingest/stamp_guard.h"
+
 namespace ear {
 namespace {
 

@@ -15,10 +15,9 @@ constexpr double kStampJitter = 0.01;     // [s] by which a reading may have wai
 constexpr double kLargestRange = 1000.0;  // [m] of a laser: more is a wrong unit
 constexpr double kWidestView = 100.0;     // tan of the angle off the axis: nothing is seen at 89.4 deg
 constexpr std::int64_t kLargestCount = std::int64_t{1} << 60;
-constexpr double kStreamGap = 0.25;  // [s] without readings of a sensor other than the IMU: a gap
-constexpr double kFarAhead = 0.5;    // [s] ahead of the inertial samples: a false stamp
-constexpr double kTooLate = 0.1;     // [s] behind the state: a reading that comes so late is not used
-constexpr double kLostAfter = 2.0;   // [s] without inertial samples: where the vehicle is now nobody knows
+constexpr double kFarAhead = 0.5;   // [s] ahead of the inertial samples: a false stamp
+constexpr double kTooLate = 0.1;    // [s] behind the state: a reading that comes so late is not used
+constexpr double kLostAfter = 2.0;  // [s] without inertial samples: where the vehicle is now nobody knows
 
 }  // namespace
 

@@ -3,21 +3,20 @@
 namespace ear {
 namespace {
 
-constexpr double kLongestStep = 0.25;  // [s] ahead that needs no confirmation
-constexpr int kConfirmed = 3;          // stamps in a row after a longer one
-constexpr double kSetBack = 1.0;       // [s] of stamps in a row before a clock that runs behind is accepted
+constexpr int kConfirmed = 3;     // stamps in a row after a longer one
+constexpr double kSetBack = 1.0;  // [s] of stamps in a row before a clock that runs behind is accepted
 
 }  // namespace
 
 Stamp StampGuard::judge(TimeNs t_ns) {
   const double step = seconds_between(last_ns_, t_ns);
-  if (!any_ || (t_ns > last_ns_ && step <= kLongestStep)) {
+  if (!any_ || (t_ns > last_ns_ && step <= kStreamGap)) {
     any_ = true;
     last_ns_ = t_ns;
     run_ = 0;
     return Stamp::next;
   }
-  const bool follows = run_ > 0 && t_ns > run_to_ns_ && seconds_between(run_to_ns_, t_ns) <= kLongestStep;
+  const bool follows = run_ > 0 && t_ns > run_to_ns_ && seconds_between(run_to_ns_, t_ns) <= kStreamGap;
   run_ = follows ? run_ + 1 : 1;
   if (!follows) run_from_ns_ = t_ns;
   run_to_ns_ = t_ns;

@@ -7,6 +7,11 @@
 
 namespace ear {
 
+/// [s] chosen: samples that do not come for so long are missing, and the stamp that follows needs to be confirmed.
+inline constexpr double kStreamGap = 0.25;
+/// [s] chosen: what a sensor showed so long ago shows nothing of now.
+inline constexpr double kStale = 0.5;
+
 [[nodiscard]] constexpr bool is_time(TimeNs t_ns) { return t_ns > -kLargestStamp && t_ns < kLargestStamp; }
 
 enum class Stamp : std::uint8_t {

@@ -108,11 +108,17 @@ void Sources::propagate(TimeNs t_ns, const Advice& advice, Ingest& ingest, Ekf& 
 }
 
 FrameAgreement Sources::check(const FeatureFrame& frame, Ingest& ingest, Ekf& ekf) {
-  if (ingest.interruption().take_uncertain() && cameras_.bridge(frame, ekf)) {
-    camera_update_ = CameraUpdate::considered;
-    ingest.interruption().set_bridged(ekf.state().imu.t_ns);
+  FrameAgreement seen;
+  if (ekf.running() && !frame.repeated) {
+    if (ingest.interruption().take_uncertain() && cameras_.bridge(frame, ekf)) {
+      camera_update_ = CameraUpdate::considered;
+      ingest.interruption().set_bridged(ekf.state().imu.t_ns);
+    }
+    seen = cameras_.compare(frame, ekf);
   }
-  return cameras_.compare(frame, ekf);
+  seen.frozen = ekf.running() && frame.repeated;
+  seen.right_skipped = frame.right_skipped;
+  return seen;
 }
 
 void Sources::use_image(const FeatureFrame& frame, bool stands, const Advice& advice, Ekf& ekf, Records& records) {

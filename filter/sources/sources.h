@@ -44,7 +44,7 @@ class Sources {
   void advance(TimeNs t_ns, const Advice& advice, Ingest& ingest, Ekf& ekf, Records& records);
   /// The same without wheels and lasers.
   void propagate(TimeNs t_ns, const Advice& advice, Ingest& ingest, Ekf& ekf) const;
-  /// With the state at the frame's time: does the frame show the motion that the others predict?
+  /// With the state, if there is one, at the frame's time: does the frame show the motion that the others predict?
   [[nodiscard]] FrameAgreement check(const FeatureFrame& frame, Ingest& ingest, Ekf& ekf);
   /// The frame updates the state. `stands`: the vehicle does, and is held where it is.
   void use_image(const FeatureFrame& frame, bool stands, const Advice& advice, Ekf& ekf, Records& records);

@@ -5,8 +5,7 @@
 
 #include "filter/ekf/propagation.h"
 #include "filter/ekf/so3.h"
-#include "filter/ekf/turn_between.h"
-#include "filter/start/known_gravity.h"
+#include "filter/start/start_fit.h"
 
 namespace ear {
 namespace {
@@ -20,10 +19,7 @@ constexpr double kRotationSigma = 2e-3;  // [rad] of a rotation from the cameras
 constexpr double kWorstGravity = 0.7;    // [m/s^2] by which the cameras alone may miss it
 constexpr double kWorstFit = 2.5;        // root mean square residual, in standard deviations
 
-// Unknowns: velocity and gravity in the first body frame, bias of the accelerometer.
-constexpr int kV = 0, kG = 3, kBa = 6, kUnknowns = 9;
-using Vector = Eigen::Matrix<double, kUnknowns, 1>;
-using Matrix = Eigen::Matrix<double, kUnknowns, kUnknowns>;
+using Fit = StartFit<9>;  // the gyroscope's bias is found before
 
 /// What the inertial samples add up to since the first moment, in the body frame of then.
 struct Sums {
@@ -62,7 +58,7 @@ void MovingStart::add(TimeNs t_ns, const FeatureFrame& frame, const ImuBuffer& i
     start.R_B0B1 = gyro_rotation(last.t_ns, t_ns, Eigen::Vector3d::Zero(), imu);
     const double dt = seconds_between(last.t_ns, t_ns);
     start.p_B0B1 = path_to(t_ns).value_or(Eigen::Vector3d::Zero());
-    const std::optional<StereoMotion> motion = stereo_motion(matches, cameras, start, noise_.feature);
+    const std::optional<StereoMotion> motion = stereo_motion(matches, cameras, start, feature_sigma_);
     if (motion && dt < kLongestStep && !frozen(matches)) {
       next.motion = *motion;
     } else {
@@ -85,7 +81,7 @@ std::optional<Eigen::Vector3d> MovingStart::path_to(TimeNs t_ns) const {
 
 /// What turns the gyroscope's rotation into that of the cameras.
 Eigen::Vector3d MovingStart::gyro_bias(const ImuBuffer& imu) const {
-  double weight = 1.0 / (noise_.gyro_bias * noise_.gyro_bias);
+  double weight = 1.0 / (prior_.gyro_bias * prior_.gyro_bias);
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (std::size_t k = 1; k < frames_.size(); ++k) {
     const double dt = seconds_between(frames_[k - 1].t_ns, frames_[k].t_ns);
@@ -105,10 +101,8 @@ std::optional<ImuState> MovingStart::solve(const ImuBuffer& imu) const {
   if (!spans_enough()) return std::nullopt;
   const Eigen::Vector3d b_g = gyro_bias(imu);
   const TimeNs start_ns = frames_.front().t_ns;
-  Matrix A = Matrix::Zero();
-  Vector b = Vector::Zero();
-  double cost = 0.0;
-  A.diagonal().segment<3>(kBa).setConstant(1.0 / (noise_.accel_bias * noise_.accel_bias));
+  Fit fit;
+  fit.expect(Fit::accel_bias, prior_.accel_bias);
   Sums sums;
   for (std::size_t k = 1; k < frames_.size(); ++k) {
     const TimeNs from_ns = frames_[k - 1].t_ns;
@@ -120,36 +114,24 @@ std::optional<ImuState> MovingStart::solve(const ImuBuffer& imu) const {
     const double t0 = seconds_between(start_ns, from_ns);
     const double t1 = seconds_between(start_ns, to_ns);
     const StereoMotion& motion = frames_[k].motion;
-    Eigen::Matrix<double, 3, kUnknowns> H;
-    H.middleCols<3>(kV) = (t1 - t0) * Eigen::Matrix3d::Identity();
-    H.middleCols<3>(kG) = 0.5 * (t1 * t1 - t0 * t0) * Eigen::Matrix3d::Identity();
-    H.middleCols<3>(kBa) = sums.position_by_b_a - before.position_by_b_a;
+    Fit::Rows H;
+    H.middleCols<3>(Fit::velocity) = (t1 - t0) * Eigen::Matrix3d::Identity();
+    H.middleCols<3>(Fit::gravity) = 0.5 * (t1 * t1 - t0 * t0) * Eigen::Matrix3d::Identity();
+    H.middleCols<3>(Fit::accel_bias) = sums.position_by_b_a - before.position_by_b_a;
     const Eigen::Vector3d z = before.R * motion.p_B0B1 - (sums.position - before.position);
     const double scale = kScaleSigma * motion.p_B0B1.norm();
     const double unsteady = kAccelSigma * (t1 - t0) * (t1 - t0);
     const double variance =
         motion.p_covariance().trace() / 3.0 + kPathSigma * kPathSigma + scale * scale + unsteady * unsteady;
-    A += H.transpose() * H / variance;
-    b += H.transpose() * z / variance;
-    cost += z.squaredNorm() / variance;
+    fit.add(H, z, variance);
   }
 
   // Gravity as the cameras alone see it must have about its known size.
-  const Vector unbound = solve_symmetric(A, b);
-  const double miss = std::abs(unbound.segment<3>(kG).norm() + kGravity_W.z());
-  if (!(miss < kWorstGravity)) return std::nullopt;
-  const Vector x = solve_with_known_gravity(A, b, kG);
-  const double fit = x.dot(A * x) - 2.0 * b.dot(x) + cost;
-  const auto rows = 3.0 * static_cast<double>(frames_.size() - 1);
-  if (!(fit <= kWorstFit * kWorstFit * rows)) return std::nullopt;
-
-  ImuState state;
-  state.t_ns = start_ns;
-  state.R_WB = turn_between(x.segment<3>(kG), kGravity_W);
-  state.v_W = state.R_WB * x.segment<3>(kV);
-  state.b_g = b_g;
-  state.b_a = x.segment<3>(kBa);
-  return state;
+  if (!(std::abs(fit.free_gravity() + kGravity_W.z()) < kWorstGravity)) return std::nullopt;
+  const std::optional<Fit::Vector> x = fit.solve(kWorstFit);
+  if (!x) return std::nullopt;
+  return start_state(start_ns, x->segment<3>(Fit::velocity), x->segment<3>(Fit::gravity), b_g,
+                     x->segment<3>(Fit::accel_bias));
 }
 
 }  // namespace ear

@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "ear/filter_config.h"
 #include "ear/types.h"
 #include "filter/ekf/state.h"
 #include "filter/ingest/imu_buffer.h"
@@ -15,17 +16,11 @@ namespace ear {
 /// [s] chosen: of what a start in motion takes.
 inline constexpr double kStartSpan = 1.5;
 
-/// Standard deviations of what is not known before, and of one observation.
-struct MovingStartNoise {
-  double gyro_bias = 0.1;    ///< [rad/s]
-  double accel_bias = 0.05;  ///< [m/s^2]
-  double feature = 1e-3;     ///< one observation, normalized
-};
-
 /// Keeps the frames of the last seconds, and how the vehicle moved between them.
 class MovingStart {
  public:
-  explicit MovingStart(const MovingStartNoise& noise) : noise_(noise) {}
+  /// `feature_sigma`: of one observation, normalized.
+  MovingStart(const PriorConfig& prior, double feature_sigma) : prior_(prior), feature_sigma_(feature_sigma) {}
 
   struct TimedFrame {
     TimeNs t_ns = 0;  ///< IMU time
@@ -55,7 +50,8 @@ class MovingStart {
  private:
   [[nodiscard]] Eigen::Vector3d gyro_bias(const ImuBuffer& imu) const;
 
-  MovingStartNoise noise_;
+  PriorConfig prior_;
+  double feature_sigma_;
   std::vector<TimedFrame> frames_;  ///< oldest first
   StereoMatches matches_;
 };

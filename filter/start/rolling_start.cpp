@@ -3,21 +3,17 @@
 #include <cmath>
 
 #include "filter/ekf/so3.h"
-#include "filter/ekf/turn_between.h"
-#include "filter/start/known_gravity.h"
+#include "filter/ingest/stamp_guard.h"
+#include "filter/start/start_fit.h"
 
 namespace ear {
 namespace {
 
-constexpr double kOldest = 0.5;           // [s] chosen: an older reading shows nothing of now
 constexpr double kSpeedSigma = 0.02;      // [m/s]
 constexpr double kDirectionSigma = 0.05;  // [rad] of the velocity in the body: it pitches about the axle
 constexpr double kWorstFit = 2.0;         // root mean square residual, in standard deviations
 
-// Unknowns: velocity and gravity in the first body frame, biases.
-constexpr int kV = 0, kG = 3, kBg = 6, kBa = 9, kUnknowns = 12;
-using Vector = Eigen::Matrix<double, kUnknowns, 1>;
-using Matrix = Eigen::Matrix<double, kUnknowns, kUnknowns>;
+using Fit = StartFit<12>;
 
 /// What the inertial samples add up to since the first moment, in the body frame of then.
 struct Sums {
@@ -40,7 +36,7 @@ struct Sums {
 
 Reason lacking_for_rolling_start(const ImuBuffer& imu, const Ring<WheelIncrement>& turns, TimeNs now_ns,
                                  double min_duration) {
-  if (turns.empty() || seconds_between(turns.back().to_ns, now_ns) > kOldest) return Reason::wheel_gaps;
+  if (turns.empty() || seconds_between(turns.back().to_ns, now_ns) > kStale) return Reason::wheel_gaps;
   for (std::size_t k = 1; k < turns.size(); ++k) {
     if (turns[k].from_ns != turns[k - 1].to_ns) return Reason::wheel_gaps;
   }
@@ -50,13 +46,11 @@ Reason lacking_for_rolling_start(const ImuBuffer& imu, const Ring<WheelIncrement
 }
 
 std::optional<ImuState> rolling_start(const ImuBuffer& imu, const Ring<WheelIncrement>& turns,
-                                      const OdometerState& odometer, const RollingStartNoise& noise) {
+                                      const OdometerState& odometer, const PriorConfig& prior, double stamp_sigma) {
   const TimeNs start_ns = turns.front().from_ns;
-  Matrix A = Matrix::Zero();
-  Vector b = Vector::Zero();
-  double cost = 0.0;
-  A.diagonal().segment<3>(kBg).setConstant(1.0 / (noise.gyro_bias * noise.gyro_bias));
-  A.diagonal().segment<3>(kBa).setConstant(1.0 / (noise.accel_bias * noise.accel_bias));
+  Fit fit;
+  fit.expect(Fit::gyro_bias, prior.gyro_bias);
+  fit.expect(Fit::accel_bias, prior.accel_bias);
   Sums sums;
   TimeNs now_ns = start_ns;
   for (std::size_t k = 0; k < turns.size(); ++k) {
@@ -73,29 +67,20 @@ std::optional<ImuState> rolling_start(const ImuBuffer& imu, const Ring<WheelIncr
     const double speed = odometer.wheel_radius.dot(turn.angle) / (2.0 * turn.duration()) +
                          odometer.wheel_radius.mean() * R_BO.col(1).dot(rate);
     const Eigen::Vector3d u = sums.R * (speed * R_BO.col(0) - rate.cross(odometer.T_BO.p));
-    Eigen::Matrix<double, 3, kUnknowns> H;
-    H.middleCols<3>(kV).setIdentity();
-    H.middleCols<3>(kG) = seconds_between(start_ns, middle_ns) * Eigen::Matrix3d::Identity();
-    H.middleCols<3>(kBg) = sums.gained_by_b_g - skew(u) * sums.R_integral;
-    H.middleCols<3>(kBa) = -sums.R_integral;
+    Fit::Rows H;
+    H.middleCols<3>(Fit::velocity).setIdentity();
+    H.middleCols<3>(Fit::gravity) = seconds_between(start_ns, middle_ns) * Eigen::Matrix3d::Identity();
+    H.middleCols<3>(Fit::gyro_bias) = sums.gained_by_b_g - skew(u) * sums.R_integral;
+    H.middleCols<3>(Fit::accel_bias) = -sums.R_integral;
     const Eigen::Vector3d z = u - sums.gained;
-    const double direction = std::hypot(kDirectionSigma, std::sqrt(2.0) * noise.stamp / turn.duration());
+    const double direction = std::hypot(kDirectionSigma, std::sqrt(2.0) * stamp_sigma / turn.duration());
     const double sigma = std::hypot(kSpeedSigma, direction * speed);
-    A += H.transpose() * H / (sigma * sigma);
-    b += H.transpose() * z / (sigma * sigma);
-    cost += z.squaredNorm() / (sigma * sigma);
+    fit.add(H, z, sigma * sigma);
   }
-  const Vector x = solve_with_known_gravity(A, b, kG);
-  const double fit = x.dot(A * x) - 2.0 * b.dot(x) + cost;
-  if (!(fit <= 3.0 * kWorstFit * kWorstFit * static_cast<double>(turns.size()))) return std::nullopt;
-
-  ImuState state;
-  state.t_ns = start_ns;
-  state.R_WB = turn_between(x.segment<3>(kG), kGravity_W);
-  state.v_W = state.R_WB * x.segment<3>(kV);
-  state.b_g = x.segment<3>(kBg);
-  state.b_a = x.segment<3>(kBa);
-  return state;
+  const std::optional<Fit::Vector> x = fit.solve(kWorstFit);
+  if (!x) return std::nullopt;
+  return start_state(start_ns, x->segment<3>(Fit::velocity), x->segment<3>(Fit::gravity), x->segment<3>(Fit::gyro_bias),
+                     x->segment<3>(Fit::accel_bias));
 }
 
 }  // namespace ear

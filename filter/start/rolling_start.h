@@ -4,6 +4,7 @@
 
 #include <optional>
 
+#include "ear/filter_config.h"
 #include "ear/health.h"
 #include "filter/ekf/state.h"
 #include "filter/ingest/imu_buffer.h"
@@ -12,22 +13,16 @@
 
 namespace ear {
 
-/// Standard deviations of what is not known before, and of what the wheels measure.
-struct RollingStartNoise {
-  double gyro_bias = 0.1;    ///< [rad/s]
-  double accel_bias = 0.05;  ///< [m/s^2]
-  double stamp = 0.0;        ///< [s] of one reading of the wheels
-};
-
 /// A state at the start of the first of `turns`. Least squares over the velocity v and gravity g of that moment, in the
 /// body as it then was (B), and the biases:
 ///   R_Bk u_k = v + g t_k + integral of R f,      u_k: the body's velocity that the wheels measure, along the
 ///   odometer's x
 /// It is a point to linearize at, not an estimate: the samples may be used again. Nothing if the turns contradict the
 /// inertial samples, as they do in the air or on slipping wheels. They must be all that lacking_for_rolling_start()
-/// asks for.
+/// asks for. `stamp_sigma` [s]: of one reading of the wheels.
 [[nodiscard]] std::optional<ImuState> rolling_start(const ImuBuffer& imu, const Ring<WheelIncrement>& turns,
-                                                    const OdometerState& odometer, const RollingStartNoise& noise);
+                                                    const OdometerState& odometer, const PriorConfig& prior,
+                                                    double stamp_sigma);
 
 /// What the readings lack for a rolling start: Reason::none if the turns follow each other up to `now_ns` or shortly
 /// before, span `min_duration` [s], and the inertial samples reach back to the first.

@@ -53,7 +53,7 @@ GivenStart checked(const GivenStart& given) {
 Start::Start(const FilterConfig& config, const Calibration& calibration)
     : config_(config),
       calibration_(calibration),
-      moving_({config.prior.gyro_bias, config.prior.accel_bias, config.feature_sigma_px / focal_length(calibration)}) {}
+      moving_(config.prior, config.feature_sigma_px / focal_length(calibration)) {}
 
 bool Start::uses_wheels() const { return calibration_.encoder && config_.odometer.model != OdometerModel::none; }
 
@@ -71,14 +71,14 @@ std::optional<StartState> Start::find(const Situation& now, const ImuStatistics&
     lacks = Reason::other_gravity;
   }
   if (!start && now.rolls) {
-    const RollingStartNoise noise{config_.prior.gyro_bias, config_.prior.accel_bias, calibration_.encoder->stamp_sigma};
-    const OdometerState odometer = odometer_state(calibration_);
-    lacks = lacking_for_rolling_start(ingest.imu(), ingest.waiting_increments(), now.t_ns, kStartSpan);
-    const std::optional<ImuState> x = lacks == Reason::none
-                                          ? rolling_start(ingest.imu(), ingest.waiting_increments(), odometer, noise)
-                                          : std::nullopt;
-    if (x) start = in_motion(*x);
-    if (lacks == Reason::none) lacks = Reason::wheels_contradict;
+    const Ring<WheelIncrement>& turns = ingest.waiting_increments();
+    lacks = lacking_for_rolling_start(ingest.imu(), turns, now.t_ns, kStartSpan);
+    if (lacks == Reason::none) {
+      const std::optional<ImuState> x = rolling_start(ingest.imu(), turns, odometer_state(calibration_), config_.prior,
+                                                      calibration_.encoder->stamp_sigma);
+      if (x) start = in_motion(*x);
+      lacks = Reason::wheels_contradict;
+    }
   }
   if (start) return start;
   start = find_in_motion(now, ingest, true);

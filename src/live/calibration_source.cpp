@@ -1,7 +1,6 @@
 #include "src/live/calibration_source.h"
 
-#include <stdlib.h>
-
+#include <cstdlib>
 #include <optional>
 #include <string>
 #include <system_error>

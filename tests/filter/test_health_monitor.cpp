@@ -189,7 +189,7 @@ TEST_CASE("health: a frozen image, a stuck beam, a gap, a clipped value, a jumpi
   SUBCASE("clipped") {
     Drive drive;
     drive.go_on(1.0);
-    drive.monitor.report_imu_fault(false, true, at(1.0));
+    drive.monitor.report_imu_fault({false, true}, at(1.0));
     drive.go_on(0.05);
     CHECK(degraded_by(drive, Source::accelerometer));
     CHECK_FALSE(drive.health().faulty[index_of(Source::gyroscope)]);

@@ -94,6 +94,17 @@ TEST_CASE("ingest: a restart forgets samples and readings, not the counts") {
   CHECK(ingest.counts().imu.accepted == 11);
 }
 
+TEST_CASE("ingest: of readings that are dropped, passed ones too, nothing is left for another state") {
+  Ingest ingest = filled(50 * kMs);
+  for (int i = 0; i < 4; ++i) push(ingest, 10 * kMs * i, i);
+  ingest.push(BeamRanges(LaserSample{20 * kMs, {0.1, 0.2, 0.3}}));
+  REQUIRE(ingest.next(10 * kMs));
+  REQUIRE(ingest.increments().size() == 3);
+  ingest.drop_readings();
+  CHECK(ingest.increments().size() == 0);
+  CHECK_FALSE(ingest.next(1000 * kMs));
+}
+
 TEST_CASE("ingest: of a full queue the state has to pass the oldest first; without a state it makes room") {
   Ingest ingest = filled(10000 * kMs);
   WheelIncrement increment{0, 10 * kMs, {0.1, 0.1}};

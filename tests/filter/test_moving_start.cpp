@@ -37,7 +37,7 @@ std::optional<ImuState> start(const simulator::Simulation& simulation, double fr
   for (const ImuSample& sample : simulation.imu()) {
     if (sample.t_ns >= begin_ns - 20'000'000 && sample.t_ns <= end_ns + 20'000'000) imu.push(sample);
   }
-  MovingStart moving({0.1, 0.05, 0.6 / 385.0});
+  MovingStart moving(PriorConfig{}, 0.6 / 385.0);
   const CameraState cameras = cameras_of(simulation.calibration());
   for (std::size_t i = 0; i < simulation.frame_times().size(); ++i) {
     const TimeNs t_ns = simulation.frame_times()[i];

@@ -29,7 +29,7 @@ from pathlib import Path
 PARTS = {
     "pipeline": [r"ear::Odometry::add_(stereo|imu|encoder|laser)\("],
     "front end": [r"ear::Frontend::process\("],
-    "filter": [r"ear::Filter::(process|add_imu|add_encoder|add_laser|common_stamp|motion_to)\("],
+    "filter": [r"ear::(Filter::process|CommonEstimator::(add_imu|add_encoder|add_laser|common_stamp|motion_to))\("],
 }
 PROCESS = r"ear::Filter::process\("
 FLOOR_CALLER = r"ear::tools::Floor::measure\("
@@ -44,7 +44,7 @@ STAGES = {
     "  outliers": [r"ear::Frontend::Impl::reject\("],
     "  new features": [r"ear::Frontend::Impl::detect\("],
     "filter": PARTS["filter"],
-    "  samples": [r"ear::Filter::add_(imu|encoder|laser)\("],
+    "  samples": [r"ear::CommonEstimator::add_(imu|encoder|laser)\("],
     "  updates": [r"ear::Covariance::update\("],
     "  propagation": [r"ear::Ekf::propagate\("],
     "  features": [r"ear::TrackUpdate::add\(", r"ear::FeatureInformation::compress\("],

@@ -7,15 +7,13 @@ namespace ear {
 namespace {
 
 constexpr double kConfirmation = 0.1;  // [s] for which a strike confirms
-constexpr double kJustNow = 0.3;       // [s] the distance rolled in this time counts for the tolerance
+constexpr double kJustNow = 0.3;       // [s] of the distance rolled, for the tolerance; and of beams that measure
 constexpr double kOtherGround = 0.2;   // [m] over which the ground becomes another
 constexpr double kLevelSigma = 0.02;   // [m] of the wheels' height over the plane; the beams see it ten times meanwhile
 constexpr double kLevelTime = 2.0;     // [s] the same for a vehicle at rest
 constexpr double kLongestStep = 0.1;   // [s] between inertial samples
 constexpr double kAirSpeed = 1.0;      // [m/s] at which the ground passes below a flying vehicle
 constexpr double kFirstDuration = 0.1;  // [s] of evidence for the first mode
-constexpr double kSilence = 0.3;        // [s] without a reading that agrees, and the beams show nothing
-constexpr double kHeightKnown = 0.05;   // [m]
 
 }  // namespace
 
@@ -98,7 +96,7 @@ double ContactDetector::tolerance(bool all_agree) const {
 }
 
 ContactEvent ContactDetector::look_for_first_evidence(TimeNs t_ns) {
-  if (!lasts(ground_->height_sigma() < kHeightKnown, t_ns, kFirstDuration)) return ContactEvent::none;
+  if (!lasts(height_known(), t_ns, kFirstDuration)) return ContactEvent::none;
   return change(ground_->height() < config_.confirmed_height ? ContactMode::ground : ContactMode::air, t_ns);
 }
 
@@ -125,10 +123,12 @@ ContactEvent ContactDetector::look_for_touchdown(TimeNs t_ns) {
 ContactEvent ContactDetector::look_for_confirmed_touchdown(TimeNs t_ns) {
   if (mode_ != ContactMode::air) return ContactEvent::none;
   const bool struck = strike_ns_ > since_ns_ && seconds_between(strike_ns_, t_ns) < kConfirmation;
-  const bool silent = seconds_between(seen_ns_, t_ns) > kSilence;
-  const bool low = ground_->height_sigma() < kHeightKnown && ground_->height() < config_.confirmed_height;
+  const bool silent = seconds_between(seen_ns_, t_ns) > kJustNow;
+  const bool low = height_known() && ground_->height() < config_.confirmed_height;
   return struck && low && !silent ? change(ContactMode::ground, t_ns) : ContactEvent::none;
 }
+
+bool ContactDetector::height_known() const { return ground_->height_sigma() < config_.confirmed_height; }
 
 bool ContactDetector::lasts(bool holds, TimeNs t_ns, double duration) {
   if (!holds) {

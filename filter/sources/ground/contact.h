@@ -56,6 +56,7 @@ class ContactDetector {
   ContactEvent look_for_touchdown(TimeNs t_ns);
   ContactEvent look_for_confirmed_touchdown(TimeNs t_ns);
   [[nodiscard]] bool lasts(bool holds, TimeNs t_ns, double duration);
+  [[nodiscard]] bool height_known() const;
   [[nodiscard]] double tolerance(bool all_agree) const;
   void roll(const WheelIncrement& increment);
 

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "filter/ekf/so3.h"
+#include "filter/ingest/stamp_guard.h"
 
 namespace ear {
 namespace {
@@ -25,7 +26,6 @@ constexpr double kGate = 4.0;            // standard deviations
 constexpr double kReturnGate = 2.0;      // the same for a beam that disagreed before
 constexpr double kReturnTime = 0.07;     // [s] chosen: of agreement, until it is used again
 constexpr double kLostTime = 0.03;       // [s] chosen: readings without any agreement, until all is forgotten
-constexpr double kLongestGap = 0.5;      // [s] without readings, until all is forgotten
 
 }  // namespace
 
@@ -71,7 +71,7 @@ GroundTracker::Sighting GroundTracker::update(const LaserSample& sample) {
   const double dt = any_ ? seconds_between(last_ns_, sample.t_ns) : 0.0;
   any_ = true;
   last_ns_ = sample.t_ns;
-  if (dt > kLongestGap) forget();
+  if (dt > kStale) forget();
   predict(dt);
 
   Sighting sighting;

@@ -44,12 +44,12 @@ bool StandstillDetector::update(const FeatureFrame& frame, const ImuStatistics& 
   const std::optional<double> flow_px = common_flow_px(frame);
   const bool known = flow_px || wheel_rest;
   const bool moved = (flow_px && *flow_px > max_flow_px) || (wheel_rest && *wheel_rest < kNoRest);
-  if (!imu_quiet || since_ns_ == kMoving || !known || moved) {
+  if (!imu_quiet || !since_ns_ || !known || moved) {
     restart(frame);
     return false;
   }
   const bool enough_imu = imu.duration > 0.8 * config_.duration;
-  standing_ = enough_imu && seconds_between(since_ns_, frame.t_ns) >= config_.duration;
+  standing_ = enough_imu && seconds_between(*since_ns_, frame.t_ns) >= config_.duration;
   if (standing_ && !frame.features.empty()) renew_reference(frame);
   return standing_;
 }

@@ -20,7 +20,6 @@ class WheelRest {
   /// Do they rest now, and since when? Nothing if the newest reading is older than `max_age` seconds before t_ns, and
   /// than two of the intervals in which readings come.
   [[nodiscard]] std::optional<double> duration(TimeNs t_ns, double max_age) const;
-  void clear() { any_ = false; }
 
  private:
   bool any_ = false;
@@ -42,8 +41,6 @@ class StandstillDetector {
               std::optional<double> wheel_rest);
 
  private:
-  static constexpr TimeNs kMoving = -1;
-
   void restart(const FeatureFrame& frame);
   void renew_reference(const FeatureFrame& frame);
   void sort_reference();
@@ -53,7 +50,7 @@ class StandstillDetector {
   StandstillConfig config_;
   double focal_px_;
   bool standing_ = false;
-  TimeNs since_ns_ = kMoving;                  ///< first frame of the present stillness
+  std::optional<TimeNs> since_ns_;             ///< first frame of the present stillness
   std::vector<FeatureObservation> reference_;  ///< features where they were then, by ascending id
   std::vector<FeatureObservation> renewed_;
   std::array<std::vector<double>, 4> flow_;

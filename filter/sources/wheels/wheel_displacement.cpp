@@ -37,7 +37,7 @@ Displacement wheel_displacement(const State& x, const Covariance& P, const Wheel
   const Eigen::Matrix3d R_BW = x.imu.R_WB.transpose();
   const Eigen::Vector3d n_B =
       setting.on_plane ? Eigen::Vector3d(R_BW * x.ground.n_W) : Eigen::Vector3d(odometer.T_BO.R.col(2));
-  WheelPreintegration wheels(setting.wheels, setting.noise);
+  WheelPreintegration wheels(wheel_model(odometer), setting.noise);
   wheels.start(n_B, x.imu.b_g);
   Displacement result;
   if (to_ns <= x.imu.t_ns) return result;

@@ -23,7 +23,6 @@ namespace ear {
 
 /// What the wheels' displacement needs to know beside the readings.
 struct WheelSetting {
-  WheelModel wheels;
   WheelNoise noise;
   double speed_sigma = 0.0;     ///< [m/s] in every direction
   double side_slip_turn = 0.0;  ///< [m/s per rad/s] along the axle

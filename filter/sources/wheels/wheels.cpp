@@ -116,8 +116,8 @@ void Wheels::score_wheels(WheelRows& rows, Sigmas& sigma, TimeNs t_ns, const Con
 Displacement Wheels::displacement(const Ekf& ekf, const WheelIncrements& increments, const ImuBuffer& imu, TimeNs to_ns,
                                   bool ground_known) const {
   if (uses_plane() && !ground_known) return {};
-  const WheelSetting setting{wheel_model(ekf.state().odometer), wheel_noise(config_, encoder_, imu_),
-                             config_.speed_sigma, config_.side_slip_turn, uses_plane()};
+  const WheelSetting setting{wheel_noise(config_, encoder_, imu_), config_.speed_sigma, config_.side_slip_turn,
+                             uses_plane()};
   return wheel_displacement(ekf.state(), ekf.covariance(), increments, imu, to_ns, setting);
 }
 

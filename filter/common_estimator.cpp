@@ -1,0 +1,228 @@
+#include "filter/common_estimator.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+#include "filter/ekf/propagation.h"
+#include "filter/sources/ground/ground_rows.h"
+
+namespace ear {
+namespace {
+
+constexpr double kLongestPredict = 0.5;  // [s] chosen: beyond the newest inertial sample
+
+/// From where the body was at one frame to where it is at the next.
+RelativeMotion motion_between(const Pose& T_WB0, const NavState& next) {
+  RelativeMotion motion;
+  motion.R_B1B0 = next.q_WB.toRotationMatrix().transpose() * T_WB0.R;
+  motion.p_B0B1 = T_WB0.R.transpose() * (next.p_WB - T_WB0.p);
+  motion.translation_known = true;
+  return motion;
+}
+
+}  // namespace
+
+CommonEstimator::CommonEstimator(const FilterConfig& config, const Calibration& calibration, bool uses_beams)
+    : config_(config),
+      calibration_(calibration),
+      ingest_(config, calibration),
+      ekf_(config, calibration),
+      sources_(config, calibration),
+      start_(config, calibration),
+      consistency_check_(config.anomaly),
+      health_(calibration, sources_.uses_wheels(), uses_beams) {}
+
+void CommonEstimator::succeed(CommonEstimator& before, TimeNs t_ns, TimeNs clock_shift) {
+  before.ingest_.restart();
+  ingest_ = std::move(before.ingest_);
+  start_.succeed(before.start_);
+  health_.succeed(before.health_, t_ns);
+  alignment_ = before.alignment_;
+  last_good_ = std::move(before.last_good_);
+  if (last_good_) last_good_->state.t_ns += clock_shift;
+  report_tracks(before.outcomes());
+}
+
+void CommonEstimator::forget_state() {
+  ekf_.reset();
+  sources_.reset();
+  ingest_.drop_readings();
+  ingest_.interruption() = ImuInterruption{};
+}
+
+void CommonEstimator::start_at(const GivenStart& start) {
+  if (status() == Status::tracking) throw std::invalid_argument("start: there is an estimate already");
+  start_.give(checked(start));
+}
+
+// ---- Samples in: ingest judges them, health and contact see them, and readings wait for the state to pass them
+
+void CommonEstimator::add_imu(const ImuSample& sample) {
+  ingest_.imu_clock().add(sample);
+  take_imu();
+}
+
+/// The samples that do not wait any more for a verdict on their clock.
+void CommonEstimator::take_imu() {
+  while (const std::optional<ImuSample> sample = ingest_.imu_clock().next()) {
+    const ImuVerdict verdict = ingest_.judge(*sample);
+    if (!verdict.accepted) {
+      health_.add_refused_imu();
+      continue;
+    }
+    if (verdict.begins_anew) restart(sample->t_ns, verdict.clock_shift);
+    health_.add_imu(*sample, config_.max_imu_gap);
+    const std::optional<TimeNs> due_ns = ingest_.imu_due();
+    if (due_ns && ekf_.running()) make_room(*due_ns);
+    health_.report_imu_fault(ingest_.store(*sample), sample->t_ns);
+    note(sources_.watch_contact(ingest_.imu().newest(), ekf_));
+  }
+  if (ingest_.imu_clock().take_correction()) health_.report_imu_fault({true, true}, ingest_.imu().newest().t_ns);
+}
+
+void CommonEstimator::add_encoder(const EncoderSample& sample) {
+  if (!sources_.uses_wheels()) return;
+  ingest_.imu_clock().observe(ImuClock::Stream::encoder, sample.t_ns);
+  take_imu();
+  const Ingest::Encoders taken = ingest_.take(sample, ekf_.time());
+  if (!ingest_.imu().empty()) health_.add_encoder(taken.verdict, ingest_.imu().newest().t_ns);
+  if (taken.verdict != Verdict::accepted || !taken.increment) return;
+  note(sources_.watch_contact(*taken.increment, ekf_));
+  sources_.standstill().add(*taken.increment);
+  if (const auto due_ns = ingest_.due_before(*taken.increment, ekf_.running())) make_room(*due_ns);
+  ingest_.push(*taken.increment);
+}
+
+void CommonEstimator::add_laser(const LaserSample& sample) {
+  if (!sources_.uses_wheels() || !calibration_.lasers || calibration_.lasers->beams.empty()) return;
+  ingest_.imu_clock().observe(ImuClock::Stream::laser, sample.t_ns);
+  take_imu();
+  const Verdict verdict = ingest_.judge(sample, ekf_.time());
+  if (verdict == Verdict::accepted) note(sources_.watch_contact(sample, ekf_));
+  if (!ingest_.imu().empty()) {
+    const TimeNs newest_ns = ingest_.imu().newest().t_ns;
+    health_.add_laser(sample, verdict, *calibration_.lasers, sources_.ground().stuck_beams(), newest_ns);
+  }
+  if (verdict != Verdict::accepted) return;
+  const BeamRanges ranges(sample);
+  if (const auto due_ns = ingest_.due_before(ranges, ekf_.running())) make_room(*due_ns);
+  ingest_.push(ranges);
+}
+
+std::optional<TimeNs> CommonEstimator::common_stamp(TimeNs camera_stamp_ns) {
+  ingest_.imu_clock().observe(ImuClock::Stream::camera, camera_stamp_ns);
+  take_imu();
+  if (!is_time(camera_stamp_ns)) return camera_stamp_ns;
+  const std::optional<TimeNs> stamp = ingest_.camera_stamp(camera_stamp_ns);
+  if (!stamp) health_.report_camera_fault(ingest_.imu().newest().t_ns);
+  return stamp;
+}
+
+void CommonEstimator::refuse_frame() {
+  if (!ingest_.imu().empty()) health_.add_refused_frame(ingest_.imu().newest().t_ns);
+}
+
+// ---- A frame
+
+TimeNs CommonEstimator::begin_frame(const FeatureFrame& frame) {
+  last_frame_ns_ = frame.t_ns;
+  consistency_ = Consistency{};
+  records_.outcomes = outcomes();
+  if (records_.outcomes != nullptr) records_.outcomes->clear();
+  records_.log.start_frame();
+  records_.statistics = FrameStatistics{};
+  records_.statistics.tracks = static_cast<int>(frame.features.size());
+  records_.statistics.stereo = static_cast<int>(std::count_if(frame.features.begin(), frame.features.end(),
+                                                              [](const FeatureObservation& f) { return f.has_right; }));
+  records_.statistics.on_ground = sources_.on_ground();
+  const TimeNs t_ns = imu_time(frame.t_ns, ekf_.state().camera);
+  sources_.look_at(frame, t_ns, ingest_, ekf_);
+  return t_ns;
+}
+
+bool CommonEstimator::check_image(const FeatureFrame& frame, const FrameAgreement& seen) {
+  return health_.check_image(seen, imu_time(frame.t_ns, ekf_.state().camera), ingest_.imu().newest().t_ns);
+}
+
+std::optional<Estimate> CommonEstimator::make_estimate(bool ground_known, double scale_sigma) const {
+  if (!ekf_.running()) return std::nullopt;
+  const State& x = ekf_.state();
+  const NavState here = nav_state(x.imu);
+  Estimate estimate;
+  estimate.state = alignment_.to_world(here);
+  estimate.covariance = alignment_.to_world(ekf_.ordinary_covariance(scale_sigma), here);
+  estimate.frame = records_.statistics;
+  estimate.consistency = consistency_;
+  if (ground_known) {
+    const Slope seen = slope(x.imu.R_WB * x.odometer.T_BO.R.col(1), x.ground.n_W);  // (4)
+    const std::array<int, 5> entries = {err::theta, err::theta + 1, err::theta + 2, err::normal, err::normal + 1};
+    const Eigen::Matrix<double, 5, 5> P = ekf_.covariance().matrix()(entries, entries);
+    const Eigen::Matrix2d P_slope = seen.J * P * seen.J.transpose();
+    estimate.terrain = {true, seen.along, seen.across, std::sqrt(P_slope(0, 0)), std::sqrt(P_slope(1, 1))};
+  }
+  return estimate;
+}
+
+HealthMonitor::Frame CommonEstimator::health_frame(bool image, const FrameAgreement& seen,
+                                                   const std::optional<Estimate>& estimate) const {
+  HealthMonitor::Frame frame;
+  frame.t_ns = imu_time(*last_frame_ns_, ekf_.state().camera);
+  frame.image = image;
+  frame.running = ekf_.running();
+  frame.waits_for = start_.waits_for();
+  frame.agreement = seen;
+  frame.statistics = records_.statistics;
+  frame.lifted = sources_.wheels() && sources_.wheels()->lifting(frame.t_ns);
+  if (!estimate) return frame;
+  frame.possible = ekf_.possible();
+  if (!frame.possible) return frame;
+  const auto variance = estimate->covariance.diagonal().cwiseMax(0.0);
+  frame.speed = ekf_.state().imu.v_W.norm();
+  // As the vehicle sees it, without that of the heading.
+  frame.velocity_sigma = std::sqrt(ekf_.covariance().matrix().diagonal().segment<3>(err::nu).cwiseMax(0.0).maxCoeff());
+  frame.horizontal_sigma = std::sqrt(variance.segment<2>(estimate_error::position).maxCoeff());
+  frame.vertical_sigma = std::sqrt(variance(estimate_error::position + 2));
+  return frame;
+}
+
+std::optional<Estimate> CommonEstimator::give(std::optional<Estimate> estimate) {
+  if (!estimate || !ekf_.running() || !health_.usable()) return std::nullopt;
+  estimate->health = health_.health();
+  if (estimate->health.aiding != Aiding::none) last_good_ = estimate;
+  return estimate;
+}
+
+// ---- Questions
+
+TimeNs CommonEstimator::camera_time(TimeNs imu_time_ns) const {
+  return ear::camera_time(imu_time_ns, ekf_.state().camera);
+}
+
+std::optional<RelativeMotion> CommonEstimator::motion_to(TimeNs t_ns) const {
+  const std::optional<LastImage>& last = sources_.cameras().last_image();
+  if (!is_time(t_ns) || !last || ingest_.imu().empty() || t_ns <= last->t_ns) return std::nullopt;
+  const CameraState& camera = ekf_.state().camera;
+  const TimeNs to_ns = imu_time(t_ns, camera);
+  if (ekf_.running()) {
+    return motion_between(sources_.cameras().image_pose(ekf_.state()),
+                          nav_state(integrate_to(to_ns, ekf_.state().imu, ingest_.imu())));
+  }
+  RelativeMotion motion;
+  if (const std::optional<Eigen::Vector3d> path = start_.path_to(to_ns)) {
+    motion.p_B0B1 = *path;
+    motion.translation_known = true;
+  }
+  const TimeNs from_ns = imu_time(last->t_ns, camera);
+  motion.R_B1B0 = gyro_rotation(from_ns, to_ns, Eigen::Vector3d::Zero(), ingest_.imu()).transpose();
+  return motion;
+}
+
+std::optional<NavState> CommonEstimator::predict(TimeNs t_ns) const {
+  if (!ekf_.running() || !health_.usable() || !is_time(t_ns)) return std::nullopt;
+  if (seconds_between(ingest_.imu().newest().t_ns, t_ns) > kLongestPredict) return std::nullopt;
+  return alignment_.to_world(nav_state(integrate_to(t_ns, ekf_.state().imu, ingest_.imu())));
+}
+
+}  // namespace ear
