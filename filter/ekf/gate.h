@@ -1,4 +1,4 @@
-// The gate: does an innovation fit what is expected of it? Every source's measurements pass this one.
+// The gate: does an innovation fit what is expected of it? Features must pass it; wheels and beams have scores.
 #pragma once
 
 #include <utility>

@@ -214,3 +214,24 @@ TEST_CASE("ekf: at the start both wheels are known apart better than alike") {
   CHECK(std::sqrt((mean * P * mean.transpose()).value()) ==
         doctest::Approx(config.prior.wheel_radius / std::sqrt(2.0)).epsilon(0.01));
 }
+
+TEST_CASE("ekf: at the start the product of baseline and focal length is known, each of them less well") {
+  Calibration calibration = vehicle();
+  calibration.cameras[1].T_BC.translation().x() = 0.5;
+  Ekf ekf(FilterConfig{}, calibration);
+  Eigen::VectorXd sigma = Eigen::VectorXd::Constant(err::clones, 0.1);
+  sigma.segment<3>(err::stereo + 3).setConstant(5e-4);  // [m] of the product, at the stated focal length
+  for (int camera = 0; camera < 2; ++camera) sigma(err::lens(camera)) = 2e-3;
+  ekf.start(ImuState{}, sigma);
+  const auto P = ekf.covariance().matrix();
+  Eigen::RowVectorXd baseline = Eigen::RowVectorXd::Zero(P.cols());
+  baseline(err::stereo + 3) = 1.0 / 0.5;
+  Eigen::RowVectorXd focal = Eigen::RowVectorXd::Zero(P.cols());
+  focal(err::lens(0)) = focal(err::lens(1)) = 0.5;
+  const auto deviation = [&](const Eigen::RowVectorXd& h) { return std::sqrt((h * P * h.transpose()).value()); };
+  CHECK(deviation(baseline + focal) == doctest::Approx(1e-3));
+  CHECK(deviation(focal) == doctest::Approx(2e-3 / std::sqrt(2.0)));
+  CHECK(deviation(baseline) == doctest::Approx(std::hypot(1e-3, 2e-3 / std::sqrt(2.0))));
+  CHECK(P(err::stereo + 4, err::stereo + 4) == doctest::Approx(25e-8));  // across the baseline nothing changes
+  CHECK((P - P.transpose()).norm() == 0.0);
+}

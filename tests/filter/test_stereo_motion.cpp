@@ -75,6 +75,27 @@ TEST_CASE("stereo motion: without noise it is exact, from a start that knows not
   CHECK(motion->fitting == 100);
 }
 
+TEST_CASE("stereo motion: what is known of the lenses' errors is taken out of the coordinates") {
+  // By hand: a focal length of 1 % more puts (0.5, -0.2) at (0.505, -0.202), a principal point 0.01 further right at
+  // 0.515.
+  const LensError longer{0.01, {0.01, 0.0}};
+  CHECK((longer.measured({0.5, -0.2}) - Eigen::Vector2d(0.515, -0.202)).norm() < 1e-12);
+  CHECK((longer.corrected({0.515, -0.202}) - Eigen::Vector2d(0.5, -0.2)).norm() < 1e-12);
+
+  const std::array<LensError, 2> lenses = {longer, {-0.004, {0.0, -0.006}}};
+  Pair pair = look(exp_so3(kTurn), kWay, 0.0, 1);
+  for (FeatureFrame* const frame : {&pair.from, &pair.to}) {
+    for (FeatureObservation& feature : frame->features) {
+      feature.left = lenses[0].measured(feature.left);
+      feature.right = lenses[1].measured(feature.right);
+    }
+  }
+  StereoMatches matches;
+  const auto motion = stereo_motion(matches.find(pair.from, pair.to, lenses), cameras(), StereoMotion{}, kSigma);
+  REQUIRE(motion);
+  CHECK((motion->p_B0B1 - kWay).norm() < 1e-9);
+}
+
 TEST_CASE("stereo motion: with noise the error is about what the covariance says") {
   double sum = 0.0;
   for (unsigned seed = 0; seed < 100; ++seed) {

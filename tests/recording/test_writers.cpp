@@ -147,6 +147,8 @@ TEST_CASE("summary: all that online calibration moves") {
   learned.cameras[0].T_BC.linear() << 0, 0, 1, -1, 0, 0, 0, -1, 0;
   learned.cameras[1].T_BC = learned.cameras[0].T_BC * Eigen::Translation3d(0.08, 0.01, 0.02);
   learned.camera_time_offset = 0.004;
+  learned.cameras[1].fu = 386.0;
+  learned.cameras[1].cv = 239.0;
   learned.encoder = EncoderCalibration{};
   learned.encoder->T_BO.translation() << 0.0, 0.0, -0.05;
   learned.encoder->wheel_radius = {0.0751, 0.0749};
@@ -161,6 +163,8 @@ TEST_CASE("summary: all that online calibration moves") {
   CHECK(pose("T_BC1")[3] == doctest::Approx(0.12));
   CHECK(pose("T_BO")[11] == -0.05);
   CHECK(json["camera_time_offset"] == 0.004);
+  CHECK(json["intrinsics_1"][0] == 386.0);
+  CHECK(json["intrinsics_1"][3] == 239.0);
   CHECK(json["wheel_radius_right"] == 0.0749);
   CHECK(json["track_width"] == 0.4);
   CHECK(json["beams"][0]["name"] == "rear");
