@@ -90,8 +90,9 @@ void LiveEstimator::run() {
   ::pthread_setname_np(::pthread_self(), "estimator");  // for top -H, and for who measures it
   while (true) {
     count_waiting();
+    const bool last_time = stop_;  // looked at first: what came before it is still estimated
     while (advance()) continue;
-    if (stop_) return;
+    if (last_time) return;
     timespec until{};
     ::clock_gettime(CLOCK_REALTIME, &until);
     until.tv_nsec += kWakeNs;

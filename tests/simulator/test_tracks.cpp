@@ -135,29 +135,6 @@ TEST_CASE("tracks: rays of one id meet in one point, and the noise is what was a
   CHECK(std::sqrt(sum / n) == doctest::Approx(0.5).epsilon(4.0 / std::sqrt(2.0 * n)));
 }
 
-TEST_CASE("tracks: with a wrong lens a feature is where that lens puts its pixel, not where it is") {
-  Options options;
-  options.seed = 29;
-  options.duration = 1.0;
-  options.calibration_error = 0.0;
-  const Simulation right(options);
-  options.calibration_error = 1.0;
-  const Simulation wrong(options);
-  const auto& truth = wrong.true_calibration().cameras;
-  const auto& told = wrong.calibration().cameras;
-  REQUIRE(std::abs(told[0].fu - truth[0].fu) > 0.01);
-  const auto& at = right.tracks(10).features;
-  const auto& seen = wrong.tracks(10).features;
-  REQUIRE(seen.size() == at.size());
-  for (std::size_t k = 0; k < seen.size(); ++k) {
-    CHECK((to_pixel(told[0], seen[k].left) - to_pixel(truth[0], at[k].left)).norm() < 1e-6);
-    CHECK((seen[k].left - at[k].left).norm() > 1e-5);
-    if (seen[k].has_right) {
-      CHECK((to_pixel(told[1], seen[k].right) - to_pixel(truth[1], at[k].right)).norm() < 1e-6);
-    }
-  }
-}
-
 TEST_CASE("tracks: as many as asked, spread over the picture, ids never come back") {
   Options options;
   options.seed = 22;
