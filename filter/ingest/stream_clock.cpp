@@ -19,7 +19,8 @@ double StreamClock::jump_at(TimeNs t_ns, TimeNs now_ns, double tick) const {
   const double intervals = std::max(1.0, std::round(passed / interval_));
   const double jump = seconds_between(*last_ns_, t_ns) - intervals * interval_;
   const double ahead = seconds_between(now_ns, t_ns) - ahead_;
-  return is_clock_jump(jump) && std::abs(jump) > tick && std::abs(ahead - jump) < kJumpShare * std::abs(jump) ? jump : 0.0;
+  return is_clock_jump(jump) && std::abs(jump) > tick && std::abs(ahead - jump) < kJumpShare * std::abs(jump) ? jump
+                                                                                                              : 0.0;
 }
 
 void StreamClock::follow(TimeNs t_ns, std::optional<TimeNs> now_ns) {

@@ -96,7 +96,8 @@ class Simulation {
   [[nodiscard]] const std::vector<Frame>& frames() const { return frames_; }
   /// Their stamps.
   [[nodiscard]] const std::vector<TimeNs>& frame_times() const { return frame_times_; }
-  /// Features of one of these frames, normalized with the lenses of calibration(). Throws std::out_of_range; without Options::tracks there are none.
+  /// Features of one of these frames, normalized with the lenses of calibration(). Throws std::out_of_range; without
+  /// Options::tracks there are none.
   [[nodiscard]] const FeatureFrame& tracks(std::size_t frame) const { return tracks_.at(frame); }
 
   /// All samples of all sensors in the order in which they arrive; at the same time IMU, encoder, laser, camera.
