@@ -28,6 +28,25 @@ TEST_CASE("figures: of a short drive") {
   CHECK(*figures.sigma_position > 1e-4);
 }
 
+TEST_CASE("figures: who is told the true lenses sees features where they are, whatever the recording states") {
+  simulator::Options options;
+  options.seed = 8301;
+  options.duration = 12.0;
+  options.calibration_error = 5.0;
+  const simulator::Simulation simulation(options);
+  Calibration told = simulation.true_calibration();
+  told.imu.accel_bias_sigma = 0.4;  // as large as it is drawn
+  const Figures truth = measure(simulation, told, FilterConfig{}, evaluation::AlignmentKind::yaw);
+  told.cameras = simulation.calibration().cameras;
+  const Figures wrong = measure(simulation, told, FilterConfig{}, evaluation::AlignmentKind::yaw);
+  REQUIRE(truth.ate_rmse);
+  REQUIRE(wrong.ate_rmse);
+  MESSAGE(*truth.ate_rmse, " m and ", *wrong.ate_rmse, " m, NEES ", *truth.nees_position, " and ",
+          *wrong.nees_position);
+  CHECK(*truth.ate_rmse < 0.5 * *wrong.ate_rmse);
+  CHECK(*truth.nees_orientation < 6.0);
+}
+
 TEST_CASE("figures: a vehicle that never starts has coverage 0 and nothing else") {
   const simulator::Simulation simulation = simulate(0.3);
   const Figures figures = measure(simulation, simulation.calibration(), FilterConfig{}, evaluation::AlignmentKind::yaw);

@@ -5,6 +5,7 @@
 #include "filter/filter.h"
 #include "tools/experiments/replay_simulation.h"
 #include "tools/experiments/simulation_truth.h"
+#include "tools/simulator/lens.h"
 
 namespace ear::experiments {
 namespace {
@@ -97,6 +98,9 @@ Figures measure(const simulator::Simulation& simulation, const Calibration& cali
   if (choice.timed) options.processor_time = &processor_time;
   options.camera = !calibration.cameras.empty();
   options.wheels = calibration.encoder && config.odometer.model != OdometerModel::none;
+  options.change = [&](FeatureFrame& frame) {
+    simulator::change_lenses(simulation.calibration().cameras, calibration.cameras, frame);
+  };
   if (on_health) {
     options.after = [&](const simulator::Delivery& delivery) { on_health(delivery.arrival_ns, estimator.health()); };
   }

@@ -1,7 +1,9 @@
 #include "tools/simulator/lens.h"
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
+#include <tuple>
 
 namespace ear::simulator {
 namespace {
@@ -62,6 +64,22 @@ std::optional<Eigen::Vector2d> project(const CameraCalibration& camera, const Ei
   const bool inside = pixel.x() >= margin && pixel.y() >= margin && pixel.x() <= camera.width - 1 - margin &&
                       pixel.y() <= camera.height - 1 - margin;
   return inside ? std::optional(pixel) : std::nullopt;
+}
+
+void change_lenses(const std::vector<CameraCalibration>& from, const std::vector<CameraCalibration>& to,
+                   FeatureFrame& frame) {
+  const auto intrinsics = [](const CameraCalibration& c) {
+    return std::tie(c.lens, c.fu, c.fv, c.cu, c.cv, c.distortion);
+  };
+  const std::size_t cameras = std::min({from.size(), to.size(), std::size_t{2}});
+  for (std::size_t camera = 0; camera < cameras; ++camera) {
+    if (intrinsics(from[camera]) == intrinsics(to[camera])) continue;
+    for (FeatureObservation& feature : frame.features) {
+      if (camera == 1 && !feature.has_right) continue;
+      Eigen::Vector2d& seen = camera == 0 ? feature.left : feature.right;
+      seen = to_ray(to[camera], to_pixel(from[camera], seen));
+    }
+  }
 }
 
 }  // namespace ear::simulator

@@ -3,8 +3,10 @@
 
 #include <Eigen/Core>
 #include <optional>
+#include <vector>
 
 #include "ear/calibration.h"
+#include "ear/types.h"
 
 namespace ear::simulator {
 
@@ -18,5 +20,10 @@ namespace ear::simulator {
 /// (at least `margin` pixels from the outermost pixel centres).
 [[nodiscard]] std::optional<Eigen::Vector2d> project(const CameraCalibration& camera, const Eigen::Vector3d& p_C,
                                                      double margin = 0.0);
+
+/// Features that were normalized with the lenses `from`, as who is told `to` normalizes their pixels. Cameras whose
+/// lens is the same keep their bits.
+void change_lenses(const std::vector<CameraCalibration>& from, const std::vector<CameraCalibration>& to,
+                   FeatureFrame& frame);
 
 }  // namespace ear::simulator

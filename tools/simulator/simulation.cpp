@@ -129,20 +129,6 @@ Calibration vehicle_of(const Options& options) {
   return vehicle;
 }
 
-// Who is told a wrong lens takes that one out of the pixels, not the true one.
-void take_out_lenses(const std::vector<CameraCalibration>& truth, const std::vector<CameraCalibration>& told,
-                     std::vector<FeatureFrame>& frames) {
-  const auto seen = [&](std::size_t camera, const Eigen::Vector2d& ray) {
-    return to_ray(told[camera], to_pixel(truth[camera], ray));
-  };
-  for (FeatureFrame& frame : frames) {
-    for (FeatureObservation& feature : frame.features) {
-      feature.left = seen(0, feature.left);
-      if (feature.has_right) feature.right = seen(1, feature.right);
-    }
-  }
-}
-
 // Samples arrive when they are stamped, by a clock that does not jump.
 template <typename Sample>
 void append_deliveries(std::vector<Delivery>& deliveries, const std::vector<Sample>& samples, SensorStream stream) {
@@ -228,7 +214,7 @@ void Simulation::take_frames(const Sequence& sequence) {
         clean, frames_,
         {options.faults, cameras, clean_plan->trajectory, plan_->trajectory, passersby_, options.track, options.seed});
   }
-  if (options.calibration_error.value_or(0.0) > 0.0) take_out_lenses(cameras, calibration_.cameras, tracks_);
+  for (FeatureFrame& frame : tracks_) change_lenses(cameras, calibration_.cameras, frame);
 }
 
 Truth Simulation::truth(TimeNs t_ns) const {
