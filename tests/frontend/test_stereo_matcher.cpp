@@ -164,8 +164,9 @@ TEST_CASE("stereo: off the epipolar line, as far as the right camera says that i
   const StereoMatcher matcher(pair.cameras[0], pair.cameras[1], kNearest);
   const Lens lens(truth[0]);
   const Lens right_lens(truth[1]);
+  Detector detector(320, 240, 100);
   int tried = 0, right = 0, followed = 0;
-  for (const Corner& corner : Detector(320, 240, 100).detect(pair.left, {}, 100)) {
+  for (const Corner& corner : detector.detect(pair.left, {}, 100)) {
     ReferencePatch patch;
     const auto ray = lens.to_normalized(corner.pixel.cast<double>());
     if (!ray || !patch.capture(pair.left, corner.pixel)) continue;
