@@ -71,7 +71,7 @@ void RosPublisher::take(const LiveFrame& frame) {
   }
   if (!frame.estimate || frame.status != Status::tracking) return;
   const NavState& state = frame.estimate->state;
-  const ros2::Odometry message = messages_.odometry(state, gyro_B_ - state.b_g, &*frame.estimate);
+  const ros2::Odometry message = messages_.odometry(state, rates_.gyro_B(state.t_ns) - state.b_g, &*frame.estimate);
   write(odometry_, messages_.names().odometry, state.t_ns, message);
   if (tf_) write(*tf_, "/tf", state.t_ns, messages_.transform(message));
   const ros2::Path* const path = path_writer_ && path_writer_->is_read() ? path_.add(message) : nullptr;

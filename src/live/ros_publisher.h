@@ -12,6 +12,7 @@
 #include "src/dds/participant.h"
 #include "src/live/feature_images.h"
 #include "src/live/ros_output.h"
+#include "src/rate_history.h"
 
 namespace ear::live {
 
@@ -34,8 +35,8 @@ class RosPublisher {
 
   /// By the inertial sensor's thread, after each sample.
   void take(const ImuSample& sample, const std::optional<NavState>& state);
-  /// By the estimator's thread: also the newest sample's rate.
-  void take(const LiveSample& sample) { gyro_B_ = sample.imu.gyro_B; }
+  /// By the estimator's thread: every sample, then what came of a frame.
+  void take(const LiveSample& sample) { rates_.add(sample.imu); }
   void take(const LiveFrame& frame);
   /// By the main thread, once a second.
   void publish_status(TimeNs t_ns, const std::string& rates);
@@ -51,7 +52,7 @@ class RosPublisher {
   std::optional<dds::Writer> predicted_, tf_, frames_, path_writer_, features_;
   std::unique_ptr<FeatureImages> feature_images_;  ///< with these
   dds::Writer diagnostics_;
-  Eigen::Vector3d gyro_B_ = Eigen::Vector3d::Zero();
+  RateHistory rates_;
   std::mutex mutex_;  ///< of the health
   Health health_;
 };

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <iterator>
 #include <string>
 
 namespace ear::mavlink {
@@ -12,8 +11,7 @@ namespace {
 constexpr double kMinRate = 30.0;            // [Hz] below, PX4's EKF2 may not use the messages
 constexpr double kMinInterval = 0.9 / 50.0;  // [s] 50 Hz, and a tenth for jitter
 constexpr double kMaxUnsupported =
-    0.25;                            // [s] after a frame; with no frame since, the estimate is not vision's any more
-constexpr double kMaxLatency = 0.5;  // [s] from an exposure to its estimate
+    0.25;  // [s] after a frame; with no frame since, the estimate is not vision's any more
 constexpr int kWeakQuality = 20;
 constexpr int kGoodQuality = 30;  // hysteresis: a weak estimate is good again from here on
 
@@ -77,11 +75,6 @@ SystemState to_system_state(LinkHealth health) {
 OdometryStream::OdometryStream(const Eigen::Matrix3d& R_BV, const ImuCalibration& imu)
     : R_BV_(R_BV), rate_variance_(imu.gyro_noise * imu.gyro_noise * imu.rate_hz) {}
 
-void OdometryStream::add_imu(const ImuSample& sample) {
-  samples_.push_back(sample);
-  while (seconds_between(samples_.front().t_ns, sample.t_ns) > kMaxLatency) samples_.pop_front();
-}
-
 std::optional<OdometryMessage> OdometryStream::add_frame(const std::optional<Estimate>& estimate, Status status) {
   if (estimate && estimate->health.aiding != Aiding::none) last_supported_ns_ = estimate->state.t_ns;
   const LinkHealth before = health_;
@@ -120,23 +113,12 @@ LinkHealth OdometryStream::health_after(const std::optional<Estimate>& estimate,
 }
 
 OdometryMessage OdometryStream::make_message(const NavState& state) {
-  OdometryMessage message = make_odometry(state, rate_B_at(state), R_BV_);
+  OdometryMessage message = make_odometry(state, rates_.gyro_B(state.t_ns) - state.b_g, R_BV_);
   set_covariances(message, state, last_->covariance, rate_variance_, R_BV_);
   message.reset_counter = reset_counter_;
   message.quality = static_cast<std::int8_t>(last_->health.quality);
   last_sent_ns_ = state.t_ns;
   return message;
-}
-
-Eigen::Vector3d OdometryStream::rate_B_at(const NavState& state) const {
-  if (samples_.empty()) return Eigen::Vector3d::Zero();
-  const auto later = std::lower_bound(samples_.begin(), samples_.end(), state.t_ns,
-                                      [](const ImuSample& sample, TimeNs t_ns) { return sample.t_ns < t_ns; });
-  if (later == samples_.begin()) return later->gyro_B - state.b_g;
-  if (later == samples_.end()) return samples_.back().gyro_B - state.b_g;
-  const auto earlier = std::prev(later);
-  const double part = seconds_between(earlier->t_ns, state.t_ns) / seconds_between(earlier->t_ns, later->t_ns);
-  return (1.0 - part) * earlier->gyro_B + part * later->gyro_B - state.b_g;
 }
 
 }  // namespace ear::mavlink

@@ -5,7 +5,6 @@
 
 #include <Eigen/Core>
 #include <cstdint>
-#include <deque>
 #include <optional>
 
 #include "ear/calibration.h"
@@ -13,6 +12,7 @@
 #include "ear/health.h"
 #include "src/mavlink/messages.h"
 #include "src/mavlink/odometry_message.h"
+#include "src/rate_history.h"
 
 namespace ear::mavlink {
 
@@ -34,7 +34,7 @@ class OdometryStream {
   OdometryStream(const Eigen::Matrix3d& R_BV, const ImuCalibration& imu);
 
   /// Every inertial sample, in time order: the angular rate comes from these.
-  void add_imu(const ImuSample& sample);
+  void add_imu(const ImuSample& sample) { rates_.add(sample); }
 
   /// The outcome of one frame or step. The message to send, if any.
   [[nodiscard]] std::optional<OdometryMessage> add_frame(const std::optional<Estimate>& estimate, Status status);
@@ -48,11 +48,10 @@ class OdometryStream {
  private:
   [[nodiscard]] LinkHealth health_after(const std::optional<Estimate>& estimate, Status status) const;
   [[nodiscard]] OdometryMessage make_message(const NavState& state);
-  [[nodiscard]] Eigen::Vector3d rate_B_at(const NavState& state) const;
 
   Eigen::Matrix3d R_BV_;
-  double rate_variance_;           ///< of one gyroscope sample [rad^2/s^2]
-  std::deque<ImuSample> samples_;  ///< the newest, oldest first: an exposure is older than they are
+  double rate_variance_;  ///< of one gyroscope sample [rad^2/s^2]
+  RateHistory rates_;
   LinkHealth health_ = LinkHealth::starting;
   std::uint8_t reset_counter_ = 0;
 

@@ -41,6 +41,14 @@ def rotation(w, x, y, z):
     return [row[:3] for row in bags.pose({"translation": dict(x=0, y=0, z=0), "rotation": dict(w=w, x=x, y=y, z=z)})[:3]]
 
 
+def rate_at(gyro, t_ns):
+    """Between the two samples around it, however late the image came."""
+    later = next(i for i, (t, _) in enumerate(gyro) if t >= t_ns)
+    (t0, w0), (t1, w1) = gyro[max(later - 1, 0)], gyro[later]
+    part = (t_ns - t0) / (t1 - t0) if later else 1.0
+    return [a + part * (b - a) for a, b in zip(w0, w1)]
+
+
 def vector(message):
     return [message["x"], message["y"], message["z"]]
 
@@ -118,7 +126,7 @@ class LiveRecord(InTemporaryFolder):
             R_WO = rotation(q["w"], q["x"], q["y"], q["z"])
             for row, expected in zip(R_WO, bags.product(R_WB, R_BO)):
                 self.assert_near(row, expected, 1e-6)
-            rate = next(w for t, w in gyro if t >= bags.stamp(message))  # the one that completed the frame
+            rate = rate_at(gyro, bags.stamp(message))
             w_B = [a - b for a, b in zip(rate, number("b_g"))]
             v_W = [a + b for a, b in zip(number("v"), applied(R_WB, cross(w_B, p_BO)))]
             self.assert_near(vector(message["twist"]["twist"]["linear"]), applied(transposed(R_WO), v_W), 1e-5)
