@@ -8,6 +8,8 @@ truth breaks this, an estimate is told an error that is the truth's.
 import bisect
 import math
 
+from real.layout import BadInput, read_lines, read_numbers
+
 WINDOW = 0.3  # [s] of the second difference: noise of the accelerometer does not count yet, that of positions does
 STEP = 0.05  # [s] from one second difference to the next
 LARGEST_DELAY = 0.04  # [s]
@@ -213,9 +215,21 @@ class Truth:
         return best, scatter(best)
 
 
-def judge(rows, imu):
-    """What the page shows of one recording."""
-    truth = Truth(rows, imu)
+POSE = ["timestamp", "p_x", "p_y", "p_z", "q_w", "q_x", "q_y", "q_z"]
+IMU = ["timestamp", "w_x", "w_y", "w_z", "a_x", "a_y", "a_z"]
+
+
+def judge(recording):
+    """What the page shows of the recording in this folder; nothing where its truth has no orientations."""
+    path = recording / "mav0/state_groundtruth_estimate0/data.csv"
+    if not path.exists():
+        return None
+    row = next((line for line in read_lines(path) if line.strip() and not line.startswith("#")), "")
+    more = row.count(",") + 1 - len(POSE)
+    if more < 0:
+        raise BadInput(f"{path}: {', '.join(POSE)} expected")
+    truth = Truth(read_numbers(path, POSE + ["v_x", "v_y", "v_z", *(f"column {k}" for k in range(12, more + 9))][:more]),
+                  read_numbers(recording / "mav0/imu0/data.csv", IMU))
     delay = truth.delay()
     return {"turn_scatter_rad": truth.turn_scatter(), "worst_velocity_m_s": truth.velocity_scatter(),
             "delay_s": delay and delay[0], "position_scatter_m": delay and delay[1]}
