@@ -6,12 +6,11 @@
 #include <utility>
 
 #include "filter/ekf/propagation.h"
+#include "filter/ingest/stamp_guard.h"
 #include "filter/sources/ground/ground_rows.h"
 
 namespace ear {
 namespace {
-
-constexpr double kLongestPredict = 0.5;  // [s] chosen: beyond the newest inertial sample
 
 /// From where the body was at one frame to where it is at the next.
 RelativeMotion motion_between(const Pose& T_WB0, const NavState& next) {
@@ -221,7 +220,7 @@ std::optional<RelativeMotion> CommonEstimator::motion_to(TimeNs t_ns) const {
 
 std::optional<NavState> CommonEstimator::predict(TimeNs t_ns) const {
   if (!ekf_.running() || !health_.usable() || !is_time(t_ns)) return std::nullopt;
-  if (seconds_between(ingest_.imu().newest().t_ns, t_ns) > kLongestPredict) return std::nullopt;
+  if (seconds_between(ingest_.imu().newest().t_ns, t_ns) > kStale) return std::nullopt;
   return alignment_.to_world(nav_state(integrate_to(t_ns, ekf_.state().imu, ingest_.imu())));
 }
 

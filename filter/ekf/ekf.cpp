@@ -8,7 +8,6 @@
 namespace ear {
 namespace {
 
-constexpr double kKnownScale = 1e-6;     // of the wheels where nothing can measure it: zero, but regular
 constexpr double kUncertainTurn = 5e-3;  // [rad] chosen: standard deviation of one sample that images must confirm
 
 int error_capacity(const FilterConfig& config) { return err::clone(config.window + 1); }
@@ -34,7 +33,7 @@ void Ekf::start(const ImuState& x, const Eigen::VectorXd& sigma, bool scale_is_g
   const Eigen::RowVector2d apart(1.0 / wheel_apart_, -1.0 / wheel_apart_);
   covariance_.update(apart, err::wheel_radius, Eigen::Matrix<double, 1, 1>::Zero());
   if (!scale_is_given) return;
-  const Eigen::RowVector2d mean_is_known(0.5 / kKnownScale, 0.5 / kKnownScale);
+  const Eigen::RowVector2d mean_is_known(0.5 / kKnownSigma, 0.5 / kKnownSigma);
   covariance_.update(mean_is_known, err::wheel_radius, Eigen::Matrix<double, 1, 1>::Zero());
 }
 

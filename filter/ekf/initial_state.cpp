@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "filter/ekf/so3.h"
+#include "filter/ingest/stamp_guard.h"
 
 namespace ear {
 namespace {
@@ -98,10 +99,9 @@ const Calibration& checked(const Calibration& calibration) {
 /// The prior takes both radii for independent, then their difference for known: their mean has 1 / sqrt(2) of the
 /// standard deviation of one.
 FilterConfig settings_for(const FilterConfig& config, const Calibration& calibration) {
-  constexpr double kGapIntervals = 2.5;  // chosen: one sample may be lost, two are a gap
   FilterConfig result = config;
   if (calibration.imu.rate_hz > 0.0) {
-    result.max_imu_gap = std::max(config.max_imu_gap, kGapIntervals / calibration.imu.rate_hz);
+    result.max_imu_gap = std::max(config.max_imu_gap, kMissed / calibration.imu.rate_hz);
   }
   PriorConfig& prior = result.prior;
   const auto state_pose = [](const std::optional<PoseSigma>& sigma, double& rotation, double& position) {

@@ -8,6 +8,10 @@
 
 namespace ear {
 
+/// [m, rad, 1] of position and yaw at the start, and of the wheels' scale where nothing can measure it: by definition
+/// zero, but regular.
+inline constexpr double kKnownSigma = 1e-6;
+
 /// The same, if they are usable. Throw std::invalid_argument, naming the field.
 [[nodiscard]] const FilterConfig& checked(const FilterConfig& config);
 [[nodiscard]] const Calibration& checked(const Calibration& calibration);

@@ -8,7 +8,7 @@ namespace {
 
 constexpr double kPrior = 4.0;          // innovations that the usual noise counts for; measured: 4 to 16 differ little
 constexpr double kFitting = 1.0 / 3.0;  // chosen: the least weight of a sensor that fits, three standard deviations
-constexpr int kIterations = 3;          // of the two equations of the belief; more change nothing that matters
+constexpr int kIterations = 3;          // chosen: of the two equations of the belief; more change nothing that matters
 
 }  // namespace
 

@@ -5,13 +5,9 @@
 namespace ear {
 namespace {
 
-constexpr double kRounding = 1e-9;  // of sums that should be 1
-constexpr double kSilent = 0.12;    // [s] chosen: without a frame or reading,
-constexpr double kMissed = 2.5;     // chosen: and so many of its intervals
+constexpr double kRounding = 1e-9;  // chosen: of sums that should be 1
 
 }  // namespace
-
-double longest_silence(double interval) { return std::max(kSilent, kMissed * interval); }
 
 void FaultState::add(bool wrong, TimeNs t_ns) {
   const double dt = last_ns_ ? std::clamp(seconds_between(*last_ns_, t_ns), 0.0, kFaultyAfter) : 0.0;

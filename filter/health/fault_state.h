@@ -7,17 +7,11 @@
 
 namespace ear {
 
-/// Of what a sensor measured: more of it is wrong, and so is the sensor.
-inline constexpr double kMajority = 0.5;
-
-/// How long a source may be silent [s] that usually delivers every `interval` seconds; 0: not known.
-[[nodiscard]] double longest_silence(double interval);
-
 /// Mostly wrong for kFaultyAfter seconds, it is faulty; mostly right for kSoundAfter, it is sound again.
 class FaultState {
  public:
   static constexpr double kFaultyAfter = 0.25;  // [s] chosen: docs/health.md promises half a second
-  static constexpr double kSoundAfter = 0.5;    // [s] chosen
+  static constexpr double kSoundAfter = 0.5;    // [s] chosen; a lost estimate must fit for so long, too
 
   /// What came since the last call: wrong or right. Long silence counts for kFaultyAfter at most.
   void add(bool wrong, TimeNs t_ns);

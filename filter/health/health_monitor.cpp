@@ -5,20 +5,18 @@
 namespace ear {
 namespace {
 
-constexpr double kTick = 0.03;           // [s] chosen: between two looks at silent sensors
 constexpr double kUnaided = 2.0;         // [s] chosen: that inertia alone may carry the estimate
 constexpr double kWorstVelocity = 1.0;   // [m/s] chosen: standard deviation of a velocity that is known,
-constexpr double kWorstDirection = 0.2;  // [rad] or of its direction, if more: one that is fast need not know it better
+constexpr double kWorstDirection = 0.2;  // [rad] chosen: or of its direction, if more; a fast one may be less exact
 constexpr double kContradicted = 1.0;    // [s] chosen
-constexpr double kProof = 0.5;           // [s] chosen: for which an estimate that was lost must fit to be given again
-constexpr double kPrecise = 0.05;        // of the path: two standard deviations of the position, while tracking,
-constexpr double kPreciseEnough = 0.1;   // [m] or this, if more
-constexpr double kFastest = 100.0;       // [m/s] chosen: no vehicle with wheels and rotors is faster
+constexpr double kPrecise = 0.05;       // chosen: of the path: two standard deviations of the position, while tracking,
+constexpr double kPreciseEnough = 0.1;  // [m] chosen: or this, if more
+constexpr double kFastest = 100.0;      // [m/s] chosen: no vehicle with wheels and rotors is faster
 
-constexpr int kWheelQuality = 40;  // of 100; Health::quality
-constexpr int kTrackQuality = 2;   // for each feature
-constexpr int kInertialQuality = 10;
-constexpr int kDegradedQuality = 60;  // at most, where a sensor is missing
+constexpr int kWheelQuality = 40;     // chosen: of 100; Health::quality
+constexpr int kTrackQuality = 2;      // chosen: for each feature
+constexpr int kInertialQuality = 10;  // chosen
+constexpr int kDegradedQuality = 60;  // chosen: at most, where a sensor is missing
 
 }  // namespace
 
@@ -57,8 +55,6 @@ void HealthMonitor::add_imu(const ImuSample& sample, double max_gap) {
     report({Source::gyroscope, Source::accelerometer}, t_ns);
   }
   arrivals_.imu_ns = t_ns;
-  if (seconds_between(arrivals_.tick_ns, t_ns) < kTick) return;
-  arrivals_.tick_ns = t_ns;
   note_silence(t_ns);
 }
 
@@ -207,7 +203,7 @@ void HealthMonitor::decide(TimeNs t_ns) {
   }
   const bool usable = last_.running && last_.possible && seconds_between(life_.aided_ns, t_ns) < kUnaided &&
                       velocity_known() && !life_.contradicted;
-  const bool proven = !lost() || seconds_between(life_.unproven_ns, t_ns) >= kProof;
+  const bool proven = !lost() || seconds_between(life_.unproven_ns, t_ns) >= FaultState::kSoundAfter;
   const double sigma = std::max(health_.horizontal_sigma, health_.vertical_sigma);
   health_.imprecise = 2.0 * sigma > std::max(kPreciseEnough, kPrecise * life_.travelled);
   const bool sound = !health_.faulty.any() && !health_.imprecise;

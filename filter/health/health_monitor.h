@@ -85,13 +85,12 @@ class HealthMonitor {
   [[nodiscard]] int quality(const Frame& frame) const;
   void report(std::initializer_list<Source> sources, TimeNs t_ns);
 
-  /// Stamps [ns] of what came last, and when silent sensors were last looked at.
+  /// Stamps [ns] of what came last.
   struct Arrivals {
     std::optional<TimeNs> imu_ns;
     std::optional<TimeNs> refused_imu_ns;  ///< the newest inertial one at the last refused frame
     TimeNs encoder_ns = 0, laser_ns = 0;   ///< newest inertial stamp when they came
     double encoder_interval = 0.0;         ///< [s] between the last two
-    TimeNs tick_ns = 0;
   };
   /// Since when the estimator is what it is.
   struct Life {

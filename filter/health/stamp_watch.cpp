@@ -8,7 +8,6 @@
 namespace ear {
 namespace {
 
-constexpr double kLongestDelay = 0.1;    // [s] chosen: that may be usual
 constexpr double kStampOff = 0.06;       // [s] chosen: off the usual
 constexpr double kStampSpreads = 6.0;    // chosen: mean deviations
 constexpr double kStampMemory = 1000.0;  // stamps, chosen: what is usual changes slowly
@@ -17,7 +16,6 @@ constexpr double kStampMemory = 1000.0;  // stamps, chosen: what is usual change
 
 bool StampWatch::add(TimeNs stamp_ns, TimeNs imu_ns) {
   const double ahead = seconds_between(imu_ns, stamp_ns);
-  if (count_ == 0) usual_ = std::clamp(ahead, -kLongestDelay, kLongestDelay);  // the first one may be false
   const double off = std::abs(ahead - usual_);
   const double share = std::max(1.0 / kStampMemory, 1.0 / (count_ + 1));
   const bool unusual = count_ >= kToKnow && off > std::max(kStampOff, kStampSpreads * spread_);

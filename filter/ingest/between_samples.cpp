@@ -7,7 +7,6 @@ namespace ear {
 namespace {
 
 constexpr double kMemory = 0.1;  // [s] over which second differences are averaged; chosen: some samples of any sensor
-constexpr int kSamples = 5;      // that a second difference over two steps needs
 
 }  // namespace
 
@@ -19,8 +18,9 @@ BetweenSamples::BetweenSamples(const ImuCalibration& imu) {
 ImuNoiseFactors BetweenSamples::add(const ImuSample& sample) {
   const double dt = seconds_between(last_ns_, sample.t_ns);
   last_ns_ = sample.t_ns;
-  count_ = count_ > 0 && dt > kMemory ? 1 : std::min(count_ + 1, kSamples);
-  const double share = count_ < kSamples ? 0.0 : dt / (dt + kMemory);
+  const int needed = static_cast<int>(gyro_.before.size()) + 1;  // for a second difference over two steps
+  count_ = count_ > 0 && dt > kMemory ? 1 : std::min(count_ + 1, needed);
+  const double share = count_ < needed ? 0.0 : dt / (dt + kMemory);
   return {gyro_.add(sample.gyro_B, dt, share), accel_.add(sample.accel_B, dt, share)};
 }
 

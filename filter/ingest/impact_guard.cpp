@@ -6,13 +6,11 @@
 namespace ear {
 namespace {
 
-constexpr double kAccelShare = 0.1;    // of a deviation: bandwidth, scale and timing make that much of it wrong
-constexpr double kGyroShare = 1.0;     // no body turns so suddenly: as much as a limit that is not known yet may hide
-constexpr double kFull = 0.98;         // of the range or more is clipped
-constexpr double kFlat = 1e-6;         // relative: two extreme values as equal as this were cut off
-constexpr double kGyroMemory = 0.05;   // [s] bodies turn fast, but not suddenly
-constexpr double kAccelMemory = 0.2;   // [s]
-constexpr double kSpreadMemory = 2.5;  // times the memory of the mean
+constexpr double kAccelShare = 0.1;    // chosen: of a deviation: bandwidth, scale and timing make that much of it wrong
+constexpr double kFull = 0.98;         // chosen: of the range or more is clipped
+constexpr double kFlat = 1e-6;         // chosen: relative: two extreme values as equal as this were cut off
+constexpr double kGyroMemory = 0.05;   // [s] chosen, see kRecently
+constexpr double kSpreadMemory = 2.5;  // chosen: times the memory of the mean
 
 }  // namespace
 
@@ -58,9 +56,10 @@ bool ExcessWatch::clipped(const Eigen::Vector3d& value) {
   return clip_level_ > 0.0 && largest > (1.0 - kFlat) * clip_level_;
 }
 
+/// No body turns so suddenly: all of a deviation of the rate may be wrong.
 ImpactGuard::ImpactGuard(const ImpactConfig& config, const ImuCalibration& imu)
-    : gyro_(config.gyro_range, config.gyro_deviation, kGyroMemory, kGyroShare),
-      accel_(config.accel_range, config.accel_deviation, kAccelMemory, kAccelShare),
+    : gyro_(config.gyro_range, config.gyro_deviation, kGyroMemory, 1.0),
+      accel_(config.accel_range, config.accel_deviation, kRecently, kAccelShare),
       gyro_sigma_(imu.gyro_noise * std::sqrt(imu.rate_hz)),
       accel_sigma_(imu.accel_noise * std::sqrt(imu.rate_hz)) {}
 

@@ -12,8 +12,10 @@
 
 namespace ear {
 
-/// Standard deviations of what an inertial sensor does: less is ordinary.
+/// Chosen: standard deviations of what an inertial sensor does; less is ordinary.
 inline constexpr double kOrdinary = 4.0;
+/// [s] chosen: how long ago is recent, but for the mean rate of a body, which turns fast though not suddenly.
+inline constexpr double kRecently = 0.2;
 
 /// Watches one sensor of three axes.
 class ExcessWatch {

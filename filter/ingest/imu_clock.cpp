@@ -3,21 +3,19 @@
 #include <algorithm>
 #include <cmath>
 
+#include "filter/ingest/capacity.h"
 #include "filter/ingest/stamp_guard.h"
 #include "filter/ingest/stream_clock.h"
 
 namespace ear {
 namespace {
 
-constexpr std::size_t kCapacity = 512;  // samples, twice as many as may wait: 0.25 s at 1 kHz
-constexpr double kLongestWait = 0.25;   // [s]
-constexpr int kVotes = 2;               // readings, for a verdict
-constexpr std::size_t kFewest = 3;      // samples after the jump: one false stamp is none
-constexpr double kReview = 5.0;         // [s] in which a verdict may be undone
+constexpr int kVotes = 2;        // chosen: readings, for a verdict
+constexpr double kReview = 5.0;  // [s] chosen: in which a verdict may be undone
 
 }  // namespace
 
-ImuClock::ImuClock() : samples_(kCapacity) {}
+ImuClock::ImuClock() : samples_(kReadingCapacity) {}
 
 bool ImuClock::jumps(double step) const { return interval_ > 0.0 && is_clock_jump(step - interval_); }
 
@@ -53,7 +51,7 @@ void ImuClock::add(const ImuSample& sample) {
     const double step = seconds_between(newest_waiting(), sample.t_ns);
     const bool follows = step > 0.0 && !jumps(step);
     const bool long_enough =
-        samples_.size() >= kCapacity / 2 || static_cast<double>(samples_.size()) * interval_ > kLongestWait;
+        samples_.size() >= kReadingCapacity / 2 || static_cast<double>(samples_.size()) * interval_ > kStreamGap;
     if (!follows || long_enough) settle(false);
   } else if (last_ns_) {
     const double step = seconds_between(*last_ns_, sample.t_ns);
@@ -74,7 +72,7 @@ void ImuClock::observe(Stream stream, TimeNs stamp_ns) {
     const double passed = static_cast<double>(samples_.size()) * interval_;
     const double measured = seconds_between(*other.before_ns, stamp_ns);
     votes_ += std::abs(measured - passed) < kJumpShare * std::abs(jump_) ? 1 : -1;
-    const bool enough = samples_.size() >= kFewest || votes_ < 0;
+    const bool enough = samples_.size() >= kConfirmed || votes_ < 0;
     if (std::abs(votes_) >= kVotes && enough) settle(votes_ > 0);
   }
   if (!waiting_ && last_ns_) review(other, stamp_ns);

@@ -2,11 +2,12 @@
 
 #include <cmath>
 
+#include "filter/ingest/stamp_guard.h"
+
 namespace ear {
 namespace {
 
-constexpr double kSettles = 0.07;    // [s] chosen: two frames at 30 Hz after a bridge
-constexpr double kImageSoon = 0.25;  // [s] chosen: so long readings wait for an image
+constexpr double kSettles = 0.07;  // [s] chosen: two frames at 30 Hz after a bridge
 
 }  // namespace
 
@@ -36,7 +37,7 @@ bool ImuInterruption::take_uncertain() {
 
 bool ImuInterruption::waits_for_images(TimeNs t_ns) const {
   const auto since = [t_ns](TimeNs from_ns) { return seconds_between(from_ns, t_ns); };
-  return (gap_ && since(gap_->from_ns) > 0.0) || (uncertain_since_ns_ && since(*uncertain_since_ns_) < kImageSoon) ||
+  return (gap_ && since(gap_->from_ns) > 0.0) || (uncertain_since_ns_ && since(*uncertain_since_ns_) < kStreamGap) ||
          (bridged_ns_ && since(*bridged_ns_) < kSettles);
 }
 

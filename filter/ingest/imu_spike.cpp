@@ -8,10 +8,9 @@
 namespace ear {
 namespace {
 
-constexpr double kTurnRate = 100.0;    // [rad/s^2] chosen: of a multirotor of 1.5 kg, 15 N on one side at 0.15 m
-constexpr double kSpreadMemory = 0.2;  // [s] chosen
-constexpr double kReturned = 0.25;     // chosen: of the deviation, between the samples before and after a spike
-constexpr double kFlat = 0.125;  // chosen: of it, between the samples of one; half a sine over three differs by 0.4
+constexpr double kTurnRate = 100.0;  // [rad/s^2] chosen: of a multirotor of 1.5 kg, 15 N on one side at 0.15 m
+constexpr double kReturned = 0.25;   // chosen: of the deviation, between the samples before and after a spike
+constexpr double kFlat = 0.125;      // chosen: of it, between the samples of one; half a sine over three differs by 0.4
 
 }  // namespace
 
@@ -23,7 +22,7 @@ bool SpikeWatch::add(ImuBuffer& samples, double dt, bool no_strike, bool clips) 
   const double spread = kOrdinary * std::sqrt(step_variance_);
   const double limit = std::max(strikes_ && no_strike ? 0.0 : std::max(least_, least_rate_ * dt), spread);
   const double counted = std::min(step, limit);
-  step_variance_ += (1.0 - std::exp(-dt / kSpreadMemory)) * (counted * counted - step_variance_);
+  step_variance_ += (1.0 - std::exp(-dt / kRecently)) * (counted * counted - step_variance_);
 
   if (length_ > 0) {
     const double off = (measured_[length_ - 1] - before).norm();

@@ -3,13 +3,14 @@
 #include <cmath>
 #include <utility>
 
+#include "filter/ingest/capacity.h"
+
 namespace ear {
 namespace {
 
-constexpr std::size_t kImuCapacity = 4096;     // samples, chosen: 20 s at 200 Hz, 4 s at 1 kHz
-constexpr std::size_t kReadingCapacity = 512;  // chosen: readings that wait for the state to pass them
-constexpr double kStartWindow = 2.0;           // [s] chosen: of readings kept for a start while rolling
-constexpr double kHeldSample = 0.04;           // [s] chosen: so far the newest inertial sample stands for the next one
+constexpr std::size_t kImuCapacity = 4096;  // samples, chosen: 20 s at 200 Hz, 4 s at 1 kHz
+constexpr double kStartWindow = 2.0;        // [s] chosen: of readings kept for a start while rolling
+constexpr double kHeldSample = 0.04;        // [s] chosen: so far the newest inertial sample stands for the next one
 
 TimeNs begin_of(const WheelIncrement& increment) { return increment.from_ns; }
 TimeNs begin_of(const BeamRanges& ranges) { return ranges.t_ns; }

@@ -8,16 +8,16 @@
 namespace ear {
 namespace {
 
-constexpr double kLargestRate = 100.0;    // [rad/s] more than any gyroscope measures
-constexpr double kLargestForce = 1000.0;  // [m/s^2] the same of an accelerometer: 100 g
-constexpr double kLargestTurn = 500.0;    // [rad/s] of a wheel: 25 m/s with a radius of 5 cm
-constexpr double kStampJitter = 0.01;     // [s] by which a reading may have waited for its stamp
-constexpr double kLargestRange = 1000.0;  // [m] of a laser: more is a wrong unit
-constexpr double kWidestView = 100.0;     // tan of the angle off the axis: nothing is seen at 89.4 deg
-constexpr std::int64_t kLargestCount = std::int64_t{1} << 60;
-constexpr double kFarAhead = 0.5;   // [s] ahead of the inertial samples: a false stamp
-constexpr double kTooLate = 0.1;    // [s] behind the state: a reading that comes so late is not used
-constexpr double kLostAfter = 2.0;  // [s] without inertial samples: where the vehicle is now nobody knows
+constexpr double kLargestRate = 100.0;    // [rad/s] data sheets: no gyroscope measures more
+constexpr double kLargestForce = 1000.0;  // [m/s^2] data sheets: the same of an accelerometer, 100 g
+constexpr double kLargestTurn = 500.0;    // [rad/s] chosen: of a wheel, 25 m/s with a radius of 5 cm
+constexpr double kStampJitter = 0.01;     // [s] chosen: by which a reading may have waited for its stamp
+constexpr double kLargestRange = 1000.0;  // [m] chosen: of a laser; more is a wrong unit
+constexpr double kWidestView = 100.0;     // chosen: tan of the angle off the axis, nothing is seen at 89.4 deg
+constexpr std::int64_t kLargestCount = std::int64_t{1} << 60;  // chosen: differences of counters must not overflow
+constexpr double kFarAhead = 0.5;   // [s] chosen: farther ahead of the inertial samples it is a false stamp
+constexpr double kTooLate = 0.1;    // [s] chosen: behind the state; a reading that comes later is not used
+constexpr double kLostAfter = 2.0;  // [s] chosen: without inertial samples; where the vehicle is now nobody knows
 
 }  // namespace
 

@@ -3,8 +3,7 @@
 namespace ear {
 namespace {
 
-constexpr int kConfirmed = 3;     // stamps in a row after a longer one
-constexpr double kSetBack = 1.0;  // [s] of stamps in a row before a clock that runs behind is accepted
+constexpr double kSetBack = 1.0;  // [s] chosen: of stamps in a row before a clock that runs behind is accepted
 
 }  // namespace
 

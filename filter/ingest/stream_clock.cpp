@@ -8,7 +8,7 @@
 namespace ear {
 namespace {
 
-constexpr double kPause = 5.0;  // intervals; after longer ones steps show nothing
+constexpr double kPause = 5.0;  // chosen: intervals; after longer ones steps show nothing
 
 }  // namespace
 

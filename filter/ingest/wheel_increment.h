@@ -49,7 +49,7 @@ using IncrementPart = WheelIncrement;
 /// was, and where readings are missing: for longer than 50 ms and than the last increment.
 template <typename Function>
 bool for_each_part(const WheelIncrements& increments, TimeNs from_ns, TimeNs to_ns, const Function& f) {
-  constexpr TimeNs kMissedReading = 50'000'000;  // [ns]
+  constexpr TimeNs kMissedReading = 50'000'000;  // [ns] chosen
   TimeNs now_ns = from_ns;
   for (std::size_t i = 0; i < increments.size() && now_ns < to_ns; ++i) {
     const WheelIncrement& whole = increments[i];

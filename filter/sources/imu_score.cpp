@@ -6,16 +6,15 @@
 namespace ear {
 namespace {
 
-// Of the fit's covariance: it counts each observation of the later frame by itself, but what the earlier one leaves
-// wrong of a feature is common to both cameras.
+// Chosen, of the fit's covariance: it counts each observation of the later frame by itself, but what the earlier one
+// leaves wrong of a feature is common to both cameras.
 constexpr double kCommon = 3.0;
-constexpr int kFewSamples = 20;  // show the noise to 15 %
-constexpr double kStill = 0.9;   // chosen: of the features that fit one motion; where fewer do, something else moves
+constexpr double kStill = 0.9;  // chosen: of the features that fit one motion; where fewer do, something else moves
 
 }  // namespace
 
 void ImuScore::add_rest(const ImuStatistics& rest, const ImuCalibration& stated) {
-  if (rest.count < kFewSamples) return;
+  if (rest.count < kFewestForNoise) return;
   at_rest_ = {std::max(1.0, rest.gyro_density / stated.gyro_noise),
               std::max(1.0, rest.accel_density / stated.accel_noise)};
 }

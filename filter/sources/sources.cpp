@@ -9,7 +9,7 @@ namespace ear {
 namespace {
 
 constexpr double kTakeoffVelocity = 0.05;  // [m/s] chosen: what the wheels were wrong by before a take-off was noticed
-constexpr double kTakeoffPosition = 5e-3;  // [m] what came of it
+constexpr double kTakeoffPosition = 5e-3;  // [m] chosen: what came of it
 constexpr double kGapAccel = 1.0;          // [m/s^2] chosen: while nothing was measured
 constexpr double kGapRate = 0.3;           // [rad/s] chosen: the same
 // A vehicle that stood begins to shake, and the biases of MEMS sensors are others then (vibration rectification).

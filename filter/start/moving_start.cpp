@@ -5,19 +5,18 @@
 
 #include "filter/ekf/propagation.h"
 #include "filter/ekf/so3.h"
+#include "filter/ingest/stamp_guard.h"
 #include "filter/start/start_fit.h"
 
 namespace ear {
 namespace {
 
-constexpr std::size_t kFewestFrames = 8;
-constexpr double kLongestStep = 0.35;    // [s] between two frames
-constexpr double kScaleSigma = 0.02;     // of a path: noise of the disparities makes points too near or too far
-constexpr double kPathSigma = 1e-3;      // [m]
-constexpr double kAccelSigma = 0.3;      // [m/s^2] what a poor accelerometer may be off between two frames
-constexpr double kRotationSigma = 2e-3;  // [rad] of a rotation from the cameras
-constexpr double kWorstGravity = 0.7;    // [m/s^2] by which the cameras alone may miss it
-constexpr double kWorstFit = 2.5;        // root mean square residual, in standard deviations
+constexpr std::size_t kFewestFrames = 8;  // chosen
+constexpr double kScaleSigma = 0.02;   // chosen: of a path; noise of the disparities makes points too near or too far
+constexpr double kPathSigma = 1e-3;    // [m] chosen: the least of a path
+constexpr double kAccelSigma = 0.3;    // [m/s^2] chosen: what a poor accelerometer may be off between two frames
+constexpr double kWorstGravity = 0.7;  // [m/s^2] chosen: by which the cameras alone may miss it
+constexpr double kWorstFit = 2.5;      // chosen: root mean square residual, in standard deviations
 
 using Fit = StartFit<9>;  // the gyroscope's bias is found before
 
@@ -59,7 +58,7 @@ void MovingStart::add(TimeNs t_ns, const FeatureFrame& frame, const ImuBuffer& i
     const double dt = seconds_between(last.t_ns, t_ns);
     start.p_B0B1 = path_to(t_ns).value_or(Eigen::Vector3d::Zero());
     const std::optional<StereoMotion> motion = stereo_motion(matches, cameras, start, feature_sigma_);
-    if (motion && dt < kLongestStep && !frozen(matches)) {
+    if (motion && dt < kStale && !frozen(matches)) {
       next.motion = *motion;
     } else {
       frames_.clear();
@@ -86,7 +85,7 @@ Eigen::Vector3d MovingStart::gyro_bias(const ImuBuffer& imu) const {
   for (std::size_t k = 1; k < frames_.size(); ++k) {
     const double dt = seconds_between(frames_[k - 1].t_ns, frames_[k].t_ns);
     const Eigen::Matrix3d R = gyro_rotation(frames_[k - 1].t_ns, frames_[k].t_ns, Eigen::Vector3d::Zero(), imu);
-    const double information = dt * dt / (kRotationSigma * kRotationSigma);
+    const double information = dt * dt / (kSeenTurn * kSeenTurn);
     sum -= information / dt * log_so3(R.transpose() * frames_[k].motion.R_B0B1);
     weight += information;
   }

@@ -9,9 +9,9 @@
 namespace ear {
 namespace {
 
-constexpr double kSpeedSigma = 0.02;      // [m/s]
-constexpr double kDirectionSigma = 0.05;  // [rad] of the velocity in the body: it pitches about the axle
-constexpr double kWorstFit = 2.0;         // root mean square residual, in standard deviations
+constexpr double kSpeedSigma = 0.02;      // [m/s] chosen: the least of a speed
+constexpr double kDirectionSigma = 0.05;  // [rad] chosen: of the velocity in the body, which pitches about the axle
+constexpr double kWorstFit = 2.0;         // chosen: root mean square residual, in standard deviations
 
 using Fit = StartFit<12>;
 

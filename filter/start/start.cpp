@@ -13,15 +13,14 @@
 namespace ear {
 namespace {
 
-constexpr double kMovingVelocity = 0.5;      // [m/s] and share of the speed: before the samples of the window are used
+constexpr double kMovingVelocity = 0.5;      // [m/s] chosen: and share of the speed, before the window is used
 constexpr double kGravityTolerance = 1.5;    // [m/s^2] chosen: of the specific force at rest; more is a wrong unit
-constexpr double kStartGravityNoise = 0.02;  // [m/s^2] what idling rotors leave in the mean specific force
+constexpr double kStartGravityNoise = 0.02;  // [m/s^2] chosen: what idling rotors leave in the mean specific force
 constexpr double kLeastStartSpeed = 0.2;     // [m/s] chosen: a first start in motion; slower is as good as standing
-constexpr double kKnownSigma = 1e-6;         // [m, rad] of position and yaw at the start: by definition zero
-constexpr double kUnknownTilt = 0.3;         // [rad] before gravity was measured
+constexpr double kUnknownTilt = 0.3;         // [rad] chosen: before gravity was measured
 
-constexpr double kVague = 10.0;          // times the sigma of a velocity that is then measured with that sigma
-constexpr double kUnitTolerance = 1e-3;  // of the length of a quaternion: digits that were cut off
+constexpr double kVague = 10.0;          // chosen: times the sigma of a velocity that is then measured with that sigma
+constexpr double kUnitTolerance = 1e-3;  // chosen: of the length of a quaternion: digits that were cut off
 
 }  // namespace
 

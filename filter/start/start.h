@@ -1,4 +1,4 @@
-// Where the filter begins: where it is told, standing, rolling, or in motion with two cameras. Each gives a start
+// Where the filter begins: as given, standing, rolling, or in motion with two cameras. Each gives a start
 // state, or nothing. docs/filter.md, "Starts".
 #pragma once
 

@@ -15,8 +15,8 @@ double StartFit<N>::free_gravity() const {
 /// Gravity's size is a row along its present direction, again as the direction gets better.
 template <int N>
 std::optional<Eigen::Matrix<double, N, 1>> StartFit<N>::solve(double worst) const {
-  constexpr double kSigma = 0.01;  // [m/s^2] of the known size
-  constexpr int kIterations = 3;
+  constexpr double kSigma = 0.01;  // [m/s^2] chosen: of the known size
+  constexpr int kIterations = 3;   // chosen
   Vector x = A_.ldlt().solve(b_);
   for (int i = 0; i < kIterations; ++i) {
     const Eigen::Vector3d along = x.template segment<3>(gravity).normalized() / kSigma;

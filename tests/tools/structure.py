@@ -1,4 +1,4 @@
-"""How large classes may grow. check(root) returns one line of text per class of the libraries that has become too large.
+"""How large classes may grow, and how many constants the filter may have. check(root) returns one line of text per fault.
 
 Run as a program, it checks the project: structure.py ROOT.
 """
@@ -12,6 +12,12 @@ MOST_MEMBERS = 15
 MOST_FUNCTIONS = 25
 FRAME = ("filter/filter.cpp", "std::optional<Estimate> Filter::process(")  # what happens to a frame
 MOST_FRAME_LINES = 40
+CONSTANTS = "filter"
+MOST_CONSTANTS = 190
+
+# A constant is a statement that gives `constexpr` names beginning with k a value; `// ...` beside or above it has the source.
+CONSTANT = re.compile(r"^[^/\n]*\bconstexpr\s+([\w:]+|std::array<[^=]*>)\s+(k[A-Z]\w*)\s*(?:\[\w*\])?\s*=", re.MULTILINE)
+SOURCE = re.compile(r"\b(chosen|measured|data sheets?|by definition|standard deviation over)\b", re.IGNORECASE)
 
 CLASS = re.compile(r"^(?:template <[^>]*>\s*)?(?:class|struct) (?:\w+::)*(\w+)(?: final)?(?:\s*:[^{;]*)?\s*\{", re.MULTILINE)
 
@@ -70,8 +76,40 @@ def measure(body):
     return members, functions
 
 
+def comment_of(lines, line):
+    """What stands beside a line and directly above it."""
+    first = line
+    while first > 0 and lines[first - 1].lstrip().startswith("//"):
+        first -= 1
+    return " ".join(lines[first:line] + [lines[line].partition("//")[2]])
+
+
+def constants_of(text):
+    """Names of the constants in a source; and of those that are numbers with a fraction, and do not say where they come from."""
+    lines = text.split("\n")
+    names, without_source = [], []
+    for match in CONSTANT.finditer(text):
+        names.append(match[2])
+        line = text.count("\n", 0, match.end())
+        if match[1] == "double" and not SOURCE.search(comment_of(lines, line)):
+            without_source.append(match[2])
+    return names, without_source
+
+
+def check_constants(root):
+    faults, number = [], 0
+    for file in sorted((root / CONSTANTS).rglob("*")):
+        if file.suffix in (".h", ".cpp"):
+            names, without_source = constants_of(file.read_text(encoding="utf-8"))
+            number += len(names)
+            faults += [f"{file.relative_to(root)}: {name} has no source: chosen, measured, data sheet" for name in without_source]
+    if number > MOST_CONSTANTS:
+        faults.append(f"{CONSTANTS}/ has {number} constants, more than {MOST_CONSTANTS}")
+    return faults
+
+
 def check(root):
-    faults = []
+    faults = check_constants(root)
     for folder in FOLDERS:
         for file in sorted((root / folder).rglob("*")):
             if file.suffix not in (".h", ".cpp"):
@@ -94,5 +132,5 @@ def check(root):
 
 if __name__ == "__main__":
     found = check(Path(sys.argv[1]).resolve())
-    print("\n".join(found) or "structure: no class is too large")
+    print("\n".join(found) or "structure: nothing is too large")
     sys.exit(1 if found else 0)

@@ -32,6 +32,19 @@ class Structure(unittest.TestCase):
         self.assertEqual(match[1], "Small")
         self.assertEqual(structure.measure(structure.body_from(text, match.end() - 1)), (4, 3))
 
+    def test_constants(self):
+        text = """
+constexpr double kTick = 0.03;  // [s] chosen: between two looks
+// Measured by tools/bench.
+inline constexpr double kShare = 0.1;
+constexpr double kBare = 1.0;  // [m] of something
+  static constexpr int kA = 0, kB = 1;
+constexpr std::array<double, 2> kBoth = {1.0, 2.0};
+// constexpr double kGone = 2.0;
+inline constexpr int theta = 0;
+"""
+        self.assertEqual(structure.constants_of(text), (["kTick", "kShare", "kBare", "kA", "kBoth"], ["kBare"]))
+
 
 if __name__ == "__main__":
     unittest.main()

@@ -6,16 +6,14 @@
 #include "filter/ekf/initial_state.h"
 #include "filter/ekf/relative_motion.h"
 #include "filter/ingest/capacity.h"
+#include "filter/ingest/stamp_guard.h"
 
 namespace ear {
 namespace {
 
-constexpr double kBridgeRotation = 2e-3;  // [rad] chosen: standard deviations with which two images show the motion:
-constexpr double kBridgePosition = 5e-3;  // [m] well above what the features will show later
-constexpr int kBridgeRows = 6;
-constexpr double kApparent = 3.0;  // standard deviations of the cameras' calibration that look like a turn
-constexpr double kLooser = 4.0;    // a wrong distance must not look like a turn: it may be wrong by more than it should
-constexpr double kOldImage = 0.5;  // [s] chosen: after which frames have little in common
+constexpr double kBridgePosition = 5e-3;  // [m] chosen, as kSeenTurn: well above what the features will show later
+constexpr double kApparent = 3.0;       // chosen: standard deviations of the cameras' calibration that look like a turn
+constexpr double kLooser = 4.0;         // chosen: a distance may be wrong by so much more before it looks like a turn
 constexpr double kComparedStep = 1e-4;  // [rad, m] chosen: a tenth of what two images show
 constexpr double kRecent = 0.3;         // [s] chosen: an image shows the motion for so long
 constexpr double kNoisy = 1.25;         // chosen: times the usual noise of a feature; less may be chance
@@ -30,7 +28,7 @@ Cameras::Cameras(const FilterConfig& config, const Calibration& calibration)
       track_update_(config, focal_px_, count_),
       window_(config, focal_px_),
       frame_check_(config.feature_sigma_px / focal_px_, Gate(config.gate_probability, 2)),
-      rows_(kBridgeRows, err::clone(config.window + 1)) {
+      rows_(6, err::clone(config.window + 1)) {
   last_features_.features.reserve(kFeatureCapacity);
   compared_.before.features.reserve(kFeatureCapacity);
 }
@@ -101,14 +99,14 @@ bool Cameras::bridge(const FeatureFrame& frame, Ekf& ekf) {
   const Eigen::Matrix3d covariance = R_WB0 * motion->p_covariance() * R_WB0.transpose() +
                                      kBridgePosition * kBridgePosition * Eigen::Matrix3d::Identity();
   const Eigen::LLT<Eigen::Matrix3d> llt(covariance);
-  auto H = rows_.topLeftCorner(kBridgeRows, err::clone(newest) + err::clone_size);
+  auto H = rows_.topLeftCorner(6, err::clone(newest) + err::clone_size);
   H.setZero();
-  H.topLeftCorner<3, err::imu_size>() = rows.H.topRows<3>() / kBridgeRotation;
-  H.topRightCorner<3, err::clone_size>() = rows.H_clone.topRows<3>() / kBridgeRotation;
+  H.topLeftCorner<3, err::imu_size>() = rows.H.topRows<3>() / kSeenTurn;
+  H.topRightCorner<3, err::clone_size>() = rows.H_clone.topRows<3>() / kSeenTurn;
   H.bottomLeftCorner<3, err::imu_size>() = llt.matrixL().solve(rows.H.bottomRows<3>());
   H.bottomRightCorner<3, err::clone_size>() = llt.matrixL().solve(rows.H_clone.bottomRows<3>());
-  Eigen::Matrix<double, kBridgeRows, 1> r;
-  r << rows.residual.head<3>() / kBridgeRotation, llt.matrixL().solve(rows.residual.tail<3>());
+  Eigen::Matrix<double, 6, 1> r;
+  r << rows.residual.head<3>() / kSeenTurn, llt.matrixL().solve(rows.residual.tail<3>());
   ekf.apply(H, 0, r, CameraUpdate::considered);
   return true;
 }
@@ -131,7 +129,7 @@ FrameAgreement Cameras::compare(const FeatureFrame& frame, const Ekf& ekf) {
   if (count_ < 2) return agreement;
   const State& x = ekf.state();
   const double dt = last_ ? seconds_between(last_->t_ns, frame.t_ns) : 0.0;
-  if (last_ && dt <= kOldImage) {
+  if (last_ && dt <= kStale) {
     const Pose moved = motion_since_image(x);
     const double sigma_v = std::sqrt(ekf.covariance().matrix().diagonal().segment<3>(err::nu).maxCoeff());
     const double sigma_p = dt * sigma_v;

@@ -67,7 +67,7 @@ class FeatureInformation {
   bool add(const std::vector<LinearizedObservation>& observations, double sigma, double huber,
            const Eigen::Ref<const Eigen::MatrixXd>& P, const Gate& gate);
 
-  static constexpr double kRounding = 1e-11;
+  static constexpr double kRounding = 1e-11;  // measured: tests/filter/test_feature_update.cpp
 
   /// Rows equivalent to all features added: residual = H e + n, cov(n) = I. Empty if there were none. Valid until
   /// start(). `negligible`: the share of what the features show of a quantity, were they known themselves, that may

@@ -7,6 +7,8 @@ namespace ear {
 
 /// Chosen: fewer features show too little of where the vehicle is.
 inline constexpr int kFewFeatures = 10;
+/// By definition, of features or readings.
+inline constexpr double kMajority = 0.5;
 
 struct FrameAgreement {
   int matches = 0;             ///< features seen by both cameras in the first frame, by the left one in the second
@@ -22,7 +24,7 @@ struct FrameAgreement {
   bool turn_known = false;
 
   /// Do the images contradict the state? Most features are off their place then.
-  [[nodiscard]] bool contradicts() const { return left > 0.5; }
+  [[nodiscard]] bool contradicts() const { return left > kMajority; }
 };
 
 }  // namespace ear

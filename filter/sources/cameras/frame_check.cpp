@@ -9,8 +9,6 @@
 namespace ear {
 namespace {
 
-constexpr std::size_t kFewest = 8;  // features in common, for any result
-
 /// Standard deviation of an inverse depth by stereo [1/m]. `sigma`: of one observation, normalized.
 double inverse_depth_sigma(double sigma, const CameraState& cameras) {
   return std::sqrt(2.0) * sigma / cameras.T_C0C1.p.norm();
@@ -22,14 +20,13 @@ double share(int part, int of) { return of > 0 ? static_cast<double>(part) / of 
 
 double FrameCheck::share_behind(const FeatureFrame& frame, const CameraState& cameras, double noise) const {
   const double sigma_s = inverse_depth_sigma(noise * sigma_, cameras);
-  std::size_t seen = 0;
-  int behind = 0;
+  int seen = 0, behind = 0;
   for (const FeatureObservation& feature : frame.features) {
     if (!feature.has_right) continue;
     ++seen;
     behind += stereo_inverse_depth(cameras, feature.left, feature.right) < -4.0 * sigma_s ? 1 : 0;
   }
-  return seen < kFewest ? 0.0 : share(behind, static_cast<int>(seen));
+  return seen < kFewFeatures ? 0.0 : share(behind, seen);
 }
 
 FrameAgreement FrameCheck::compare(const std::vector<StereoMatch>& matches, const PredictedMotion& motion,
@@ -37,7 +34,7 @@ FrameAgreement FrameCheck::compare(const std::vector<StereoMatch>& matches, cons
   FrameAgreement result;
   const double sigma = noise * sigma_;
   result.matches = static_cast<int>(matches.size());
-  if (matches.size() < kFewest) return result;
+  if (result.matches < kFewFeatures) return result;
 
   const Pose& T_BC0 = cameras.T_BC0;
   const Pose T_BC1 = {T_BC0.R * cameras.T_C0C1.R, T_BC0.R * cameras.T_C0C1.p + T_BC0.p};

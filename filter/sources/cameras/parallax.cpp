@@ -4,12 +4,11 @@
 #include <limits>
 
 #include "filter/ingest/median.h"
+#include "filter/sources/cameras/frame_agreement.h"
 
 namespace ear {
-namespace {
-constexpr double kCommonShare = 0.5;  // of a frame's features, that its elder must have seen
-}
 
+/// Nothing is known where the elder frame did not see most of the features.
 double median_parallax(const TrackTable& tracks, const FrameRotation& from, const FrameRotation& to,
                        std::vector<double>& scratch) {
   const Eigen::Matrix3d R_to_from = to.R_WC0.transpose() * from.R_WC0;
@@ -27,7 +26,7 @@ double median_parallax(const TrackTable& tracks, const FrameRotation& from, cons
     const Eigen::Vector3d turned = R_to_from * a->left.homogeneous();
     scratch.push_back((b->left - turned.hnormalized()).norm());
   }
-  if (static_cast<double>(scratch.size()) < kCommonShare * static_cast<double>(seen) || scratch.empty()) {
+  if (static_cast<double>(scratch.size()) < kMajority * static_cast<double>(seen) || scratch.empty()) {
     return std::numeric_limits<double>::infinity();
   }
   return upper_median(scratch);

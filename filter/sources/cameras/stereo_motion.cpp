@@ -14,10 +14,10 @@
 namespace ear {
 namespace {
 
-constexpr int kIterations = 12;
-constexpr double kLeastShare = 0.6;  // of the features that fit
-constexpr double kHuber = 2.0;       // [standard deviations] from where an observation weighs less
-constexpr double kFits = 3.5;        // [standard deviations] of an observation that does
+constexpr int kIterations = 12;      // chosen
+constexpr double kLeastShare = 0.6;  // chosen: of the features that fit
+constexpr double kHuber = 2.0;       // [standard deviations] chosen: from where an observation weighs less
+constexpr double kFits = 3.5;        // [standard deviations] chosen: of an observation that does
 
 /// Sums of one Gauss-Newton step over (rotation, translation).
 struct NormalEquations {
@@ -47,11 +47,10 @@ PlainPose plain(const Eigen::Matrix3d& R, const Eigen::Vector3d& p) {
 
 /// The matches as the kernels read them.
 StereoTable table_of(const std::vector<StereoMatch>& matches) {
-  constexpr std::size_t kNumber = sizeof(double);
-  static_assert(offsetof(StereoMatch, left0) == 0 && offsetof(StereoMatch, right0) == 2 * kNumber &&
-                offsetof(StereoMatch, left1) == 4 * kNumber && offsetof(StereoMatch, right1) == 6 * kNumber &&
-                sizeof(StereoMatch) % kNumber == 0);
-  return {matches.front().left0.data(), sizeof(StereoMatch) / kNumber, &matches.front().has_right1,
+  static_assert(offsetof(StereoMatch, left0) == 0 && offsetof(StereoMatch, right0) == 2 * sizeof(double) &&
+                offsetof(StereoMatch, left1) == 4 * sizeof(double) &&
+                offsetof(StereoMatch, right1) == 6 * sizeof(double) && sizeof(StereoMatch) % sizeof(double) == 0);
+  return {matches.front().left0.data(), sizeof(StereoMatch) / sizeof(double), &matches.front().has_right1,
           static_cast<int>(matches.size())};
 }
 

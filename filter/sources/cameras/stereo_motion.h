@@ -42,6 +42,8 @@ class StereoMatches {
 
 /// Fewer features show no motion.
 inline constexpr std::size_t kFewestMatches = 12;
+/// [rad] chosen: standard deviation of a turn between two images, whatever the fit's covariance is.
+inline constexpr double kSeenTurn = 2e-3;
 
 /// The motion from frame 0 to frame 1.
 struct StereoMotion {

@@ -6,9 +6,9 @@
 namespace ear {
 namespace {
 
-constexpr int kMaxIterations = 8;
-constexpr double kSettled = 1e-10;               // squared step, in bearings and relative depth
-constexpr double kNegativeInverseDepth = -0.02;  // noise makes far points come out slightly beyond infinity [1/m]
+constexpr int kMaxIterations = 8;                // chosen
+constexpr double kSettled = 1e-10;               // chosen: squared step, in bearings and relative depth
+constexpr double kNegativeInverseDepth = -0.02;  // [1/m] chosen: noise puts far points slightly beyond infinity
 
 /// Inverse depth along the first ray for which all other rays are met best: each gives uv * z = xy, linear in it.
 double linear_inverse_depth(const std::vector<Sighting>& sightings, const Eigen::Vector3d& bearing_A) {

@@ -9,7 +9,7 @@
 
 namespace ear {
 
-/// Of a scaled point: smaller is beside or behind the camera.
+/// Chosen: of a scaled point; smaller is beside or behind the camera.
 inline constexpr double kLeastDepth = 1e-3;
 
 /// One ray: a camera's pose and what it saw, normalized.

@@ -9,7 +9,7 @@
 namespace ear {
 namespace {
 
-constexpr int kLeastWindow = 3;          // clones: one pair with parallax and the newest
+constexpr int kLeastWindow = 3;          // chosen: clones, one pair with parallax and the newest
 constexpr double kWithoutUpdates = 0.6;  // [s] measured, docs/decisions: the state may do without for so long
 
 }  // namespace

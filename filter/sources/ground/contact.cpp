@@ -6,14 +6,12 @@
 namespace ear {
 namespace {
 
-constexpr double kConfirmation = 0.1;  // [s] for which a strike confirms
-constexpr double kJustNow = 0.3;       // [s] of the distance rolled, for the tolerance; and of beams that measure
-constexpr double kOtherGround = 0.2;   // [m] over which the ground becomes another
-constexpr double kLevelSigma = 0.02;   // [m] of the wheels' height over the plane; the beams see it ten times meanwhile
-constexpr double kLevelTime = 2.0;     // [s] the same for a vehicle at rest
-constexpr double kLongestStep = 0.1;   // [s] between inertial samples
-constexpr double kAirSpeed = 1.0;      // [m/s] at which the ground passes below a flying vehicle
-constexpr double kFirstDuration = 0.1;  // [s] of evidence for the first mode
+constexpr double kConfirmation = 0.1;  // [s] chosen: of evidence for the first mode; after a strike, to confirm one
+constexpr double kJustNow = 0.3;  // [s] chosen: of the distance rolled, for the tolerance; and of beams that measure
+constexpr double kOtherGround = 0.2;  // [m] chosen: over which the ground becomes another
+constexpr double kLevelSigma = 0.02;  // [m] chosen: of the wheels' height; the beams see it ten times meanwhile
+constexpr double kLevelTime = 2.0;    // [s] chosen: the same for a vehicle at rest
+constexpr double kAirSpeed = 1.0;     // [m/s] chosen: at which the ground passes below a flying vehicle
 
 }  // namespace
 
@@ -36,7 +34,7 @@ ContactEvent ContactDetector::add_imu(const ImuSample& sample) {
   if (!ground_ || !sample.gyro_B.allFinite() || !sample.accel_B.allFinite()) return ContactEvent::none;
   if (sample.t_ns <= last_imu_ns_) return ContactEvent::none;
   const bool first = last_imu_ns_ == kNever;
-  const double dt = first ? 0.0 : std::min(seconds_between(last_imu_ns_, sample.t_ns), kLongestStep);
+  const double dt = first ? 0.0 : seconds_between(last_imu_ns_, sample.t_ns);
   last_imu_ns_ = sample.t_ns;
 
   const Eigen::Vector3d angle_B = dt * (sample.gyro_B - b_g_);
@@ -96,7 +94,7 @@ double ContactDetector::tolerance(bool all_agree) const {
 }
 
 ContactEvent ContactDetector::look_for_first_evidence(TimeNs t_ns) {
-  if (!lasts(height_known(), t_ns, kFirstDuration)) return ContactEvent::none;
+  if (!lasts(height_known(), t_ns, kConfirmation)) return ContactEvent::none;
   return change(ground_->height() < config_.confirmed_height ? ContactMode::ground : ContactMode::air, t_ns);
 }
 

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "filter/ekf/propagation.h"
+#include "filter/ingest/stamp_guard.h"
 #include "filter/sources/ground/ground_rows.h"
 
 namespace ear {
@@ -11,7 +12,6 @@ namespace {
 constexpr double kSpinUp = 0.1;     // [s] chosen: after a touchdown until the wheels roll
 constexpr double kLevelOff = 0.05;  // [m] chosen: of a plane from the wheels that stand on it
 constexpr double kLeanOff = 0.2;    // chosen: sine of the axle's angle to it
-constexpr double kPatience = 0.47;  // [s] chosen: readings that contradict the wheels for so long are accepted
 
 }  // namespace
 
@@ -84,7 +84,7 @@ bool Ground::restart(const BeamRanges& reading, const Eigen::Matrix3d& R_WB, Ekf
   const bool carries = std::abs(plane->height - o.wheel_radius.mean()) < kLevelOff &&
                        std::abs(plane->n_B.dot(o.T_BO.R.col(1))) < kLeanOff;
   if (!running_.misplaced_since_ns) running_.misplaced_since_ns = reading.t_ns;
-  if (!carries && seconds_between(*running_.misplaced_since_ns, reading.t_ns) < kPatience) return false;
+  if (!carries && seconds_between(*running_.misplaced_since_ns, reading.t_ns) < kStale) return false;
   ekf.restart_normal(carries ? Eigen::Vector3d((R_WB * plane->n_B).normalized()) : Eigen::Vector3d::UnitZ());
   running_.misplaced_since_ns.reset();
   running_.known = true;

@@ -6,9 +6,11 @@
 
 namespace ear {
 namespace {
-constexpr double kMinHitDistance =
-    0.023;  // [m] of one hit from the line through the others: 4 mm turn it by 10 degrees
-}
+
+// [m] chosen: of one hit from the line through the others; 4 mm turn it by 10 degrees.
+constexpr double kMinHitDistance = 0.023;
+
+}  // namespace
 
 std::optional<GroundPlane> plane_through_hits(const std::vector<LaserBeam>& beams, const Eigen::Vector3d& range,
                                               const Eigen::Vector3d& p_BO) {

@@ -10,21 +10,20 @@
 namespace ear {
 namespace {
 
-constexpr double kUnevenness = 0.004;    // [m] of the ground under a beam against the plane
-constexpr double kNormalWalk = 0.1;      // [rad/sqrt(m)] how the normal changes with the distance
-constexpr double kSlope = 0.2;           // [rad] standard deviation of the ground's slopes
-constexpr double kStuck = 0.07;          // [s] chosen: equal readings for so long, and the beam is stuck,
-constexpr int kFewestEqual = 4;          // chosen: but not fewer; noise makes two equal ones a chance of some percent
-constexpr double kSteepest = 0.8;        // [rad] ground that is tilted more is none
-constexpr double kUpTime = 3.0;          // [s] over which the specific force is against gravity in the mean
-constexpr double kNormalDrift = 0.02;    // [rad/sqrt(s)] what is left of the gyroscope's errors
-constexpr double kClimbWalk = 0.3;       // [m/s/sqrt(s)]
-constexpr double kUnknownNormal = 0.25;  // [rad] of the body's tilt against the ground
-constexpr double kUnknownHeight = 4.0;   // [m]
-constexpr double kUnknownClimb = 1.0;    // [m/s] at first, and what a strike changes
-constexpr double kGate = 4.0;            // standard deviations
-constexpr double kReturnGate = 2.0;      // the same for a beam that disagreed before
-constexpr double kReturnTime = 0.07;     // [s] chosen: of agreement, until it is used again
+constexpr double kUnevenness = 0.004;    // [m] chosen: of the ground under a beam against the plane
+constexpr double kNormalWalk = 0.1;      // [rad/sqrt(m)] chosen: how the normal changes with the distance
+constexpr double kSlope = 0.2;           // [rad] chosen: standard deviation of the ground's slopes
+constexpr double kNoChance = 0.07;       // [s] chosen: readings that are equal, or that agree again, for so long,
+constexpr int kFewestEqual = 4;          // chosen: and so many; noise makes two equal ones a chance of some percent
+constexpr double kSteepest = 0.8;        // [rad] chosen: ground that is tilted more is none
+constexpr double kUpTime = 3.0;          // [s] chosen: over which the specific force is against gravity in the mean
+constexpr double kNormalDrift = 0.02;    // [rad/sqrt(s)] chosen: what is left of the gyroscope's errors
+constexpr double kClimbWalk = 0.3;       // [m/s/sqrt(s)] chosen
+constexpr double kUnknownNormal = 0.25;  // [rad] chosen: of the body's tilt against the ground
+constexpr double kUnknownHeight = 4.0;   // [m] chosen
+constexpr double kUnknownClimb = 1.0;    // [m/s] chosen: at first, and what a strike changes
+constexpr double kGate = 4.0;            // chosen: standard deviations
+constexpr double kReturnGate = 2.0;      // chosen: the same for a beam that disagreed before
 constexpr double kLostTime = 0.03;       // [s] chosen: readings without any agreement, until all is forgotten
 
 }  // namespace
@@ -100,7 +99,7 @@ bool GroundTracker::usable(Beam& beam, double range, TimeNs t_ns) const {
     beam.same_from_ns = t_ns;
   }
   beam.last = range;
-  beam.stuck = ++beam.same >= kFewestEqual && seconds_between(beam.same_from_ns, t_ns) > kStuck;
+  beam.stuck = ++beam.same >= kFewestEqual && seconds_between(beam.same_from_ns, t_ns) > kNoChance;
   return !beam.stuck && range >= lasers_.range_min && range <= lasers_.range_max;
 }
 
@@ -124,7 +123,7 @@ bool GroundTracker::update_with_hit(Beam& beam, const Eigen::Vector3d& d_B, cons
   }
   if (beam.returning) {
     if (!beam.agrees_from_ns) beam.agrees_from_ns = t_ns;
-    if (seconds_between(*beam.agrees_from_ns, t_ns) < kReturnTime) return false;
+    if (seconds_between(*beam.agrees_from_ns, t_ns) < kNoChance) return false;
     beam.returning = false;
   }
   update(H, residual, variance);

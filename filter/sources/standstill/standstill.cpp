@@ -3,15 +3,9 @@
 #include "filter/ekf/relative_motion.h"
 
 namespace ear {
-namespace {
-
-constexpr double kWheelAge = 0.1;  // [s] chosen: older readings do not show whether the wheels rest
-constexpr int kRows = 9;
-
-}  // namespace
 
 Standstill::Standstill(const StandstillConfig& config, double focal_px, int window)
-    : config_(config), detector_(config, focal_px), rows_(kRows, err::clone(window + 1)) {}
+    : config_(config), detector_(config, focal_px), rows_(9, err::clone(window + 1)) {}
 
 ImuStatistics Standstill::recent(const ImuBuffer& imu, TimeNs t_ns) const {
   return imu.statistics(t_ns - static_cast<TimeNs>(1e9 * config_.duration), t_ns);
@@ -21,7 +15,7 @@ bool Standstill::update(const Evidence& evidence) {
   const double max_gyro = evidence.b_g ? config_.max_gyro : config_.max_gyro_at_start;
   stands_ = detector_.update(evidence.frame, recent(evidence.imu, evidence.t_ns),
                              evidence.b_g.value_or(Eigen::Vector3d::Zero()), max_gyro,
-                             evidence.on_ground ? wheel_rest_.duration(evidence.t_ns, kWheelAge) : std::nullopt);
+                             evidence.on_ground ? wheel_rest_.duration(evidence.t_ns) : std::nullopt);
   return stands_;
 }
 
@@ -34,9 +28,9 @@ void Standstill::hold(Ekf& ekf) {
   Eigen::Matrix<double, 6, 1> weight;
   weight << Eigen::Vector3d::Constant(1.0 / config_.rotation_sigma),
       Eigen::Vector3d::Constant(1.0 / config_.position_sigma);
-  auto H = rows_.topLeftCorner(kRows, columns);
+  auto H = rows_.topLeftCorner(9, columns);
   H.setZero();
-  Eigen::Matrix<double, kRows, 1> r;
+  Eigen::Matrix<double, 9, 1> r;
   H.topLeftCorner<6, err::imu_size>() = weight.asDiagonal() * rows.H;
   H.topRightCorner<6, err::clone_size>() = weight.asDiagonal() * rows.H_clone;
   r.head<6>() = weight.asDiagonal() * rows.residual;

@@ -5,12 +5,15 @@
 
 #include "filter/ingest/capacity.h"
 #include "filter/ingest/median.h"
+#include "filter/ingest/stamp_guard.h"
 
 namespace ear {
 namespace {
-constexpr std::size_t kMinCommonFeatures = 8;  // fewer do not set motion apart from mismatches
-constexpr double kNoRest = 0.05;               // [s] wheels that turned so lately turn
-constexpr double kWheelPlay = 0.005;           // [rad] that a wheel at rest may turn: 0.4 mm of its rim
+
+constexpr std::size_t kMinCommonFeatures = 8;  // chosen: fewer do not set motion apart from mismatches
+constexpr double kNoRest = 0.05;               // [s] chosen: wheels that turned so lately turn
+constexpr double kWheelPlay = 0.005;           // [rad] chosen: that a wheel at rest may turn: 0.4 mm of its rim
+
 }  // namespace
 
 void WheelRest::add(const WheelIncrement& turn) {
@@ -24,8 +27,8 @@ void WheelRest::add(const WheelIncrement& turn) {
   interval_ = turn.duration();
 }
 
-std::optional<double> WheelRest::duration(TimeNs t_ns, double max_age) const {
-  if (!any_ || seconds_between(newest_ns_, t_ns) > std::max(max_age, 2.0 * interval_)) return std::nullopt;
+std::optional<double> WheelRest::duration(TimeNs t_ns) const {
+  if (!any_ || seconds_between(newest_ns_, t_ns) > longest_silence(interval_)) return std::nullopt;
   return seconds_between(since_ns_, newest_ns_);
 }
 

@@ -17,9 +17,8 @@ namespace ear {
 class WheelRest {
  public:
   void add(const WheelIncrement& turn);
-  /// Do they rest now, and since when? Nothing if the newest reading is older than `max_age` seconds before t_ns, and
-  /// than two of the intervals in which readings come.
-  [[nodiscard]] std::optional<double> duration(TimeNs t_ns, double max_age) const;
+  /// Do they rest now, and since when? Nothing if the readings have been silent for too long.
+  [[nodiscard]] std::optional<double> duration(TimeNs t_ns) const;
 
  private:
   bool any_ = false;

@@ -8,9 +8,10 @@
 namespace ear {
 namespace {
 
-// Sine of the angle between axle and normal: below it, the vehicle lies on its side.
+// Chosen: sine of the angle between axle and normal: below it, the vehicle lies on its side.
 constexpr double kMinSine = 0.5;
-// Sine of the angle at which a wheel climbs beside the middle of the axle: above it, that is a jolt at low speed.
+// Chosen: sine of the angle at which a wheel climbs beside the middle of the axle: above it, that is a jolt at low
+// speed.
 constexpr double kMaxClimb = 0.5;
 
 /// Forward along the ground, unit: f = unit(y x n) (6)-(8), and its derivatives.
