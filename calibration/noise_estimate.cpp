@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <cstdlib>
 
 #include "filter/ingest/median.h"
 
@@ -82,9 +80,6 @@ std::optional<double> slip_of(const Segment& segment, const RollSetting& setting
     const double yaw = now.track_width * turned.yaw;
     const double gyro = now.track_width * setting.imu.gyro_noise;
     differences.push_back({rolled(1) - rolled(0) - yaw, gyro * gyro * duration + read * read, way});
-    if (std::getenv("SLIPDUMP"))
-      std::fprintf(stderr, "SLIP %.4f %g %g %g %g %g\n", seconds_between(segment.keyframes.front().t_ns, keyframe.t_ns),
-                   rolled(1) - rolled(0) - yaw, gyro * gyro * duration + read * read, way, turned.yaw, turned.pitch);
   }
   if (differences.size() < kFewest) return std::nullopt;
   return slip_walk(differences);
