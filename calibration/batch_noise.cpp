@@ -10,9 +10,10 @@
 namespace ear::calibration {
 namespace {
 
-constexpr double kWildPixel = 8.0;   // [sigma] of both coordinates: the feature is used no more
-constexpr double kFlattest = 2e-4;   // [m/sqrt(m)] no ground is known to change less
-constexpr double kSmoothest = 1e-3;  // [rad/sqrt(m)]
+constexpr double kWildPixel = 8.0;    // [sigma] of both coordinates: the feature is used no more
+constexpr double kFlattest = 2e-4;    // [m/sqrt(m)] no ground is known to change less
+constexpr double kLeastAside = 2e-4;  // [m/sqrt(m)] of slip along the axle, which no difference of the wheels shows
+constexpr double kSmoothest = 1e-3;   // [rad/sqrt(m)]
 
 }  // namespace
 
@@ -23,14 +24,14 @@ void Batch::learn_noise() {
   learn_from_ground();
   const RollSetting setting{*given_.encoder, given_.imu, odometer_of(*given_.encoder),
                             odometer_of(*applied(given_, parameters_).encoder), noise_.roll};
-  double slip = 0.0;
+  std::optional<double> slip;
   noise_.roll.common = 0.0;
   for (std::size_t i = 0; i < segments_.size(); ++i) {
     renew_paths(segments_[i], given_.imu.gyro_noise);
-    slip = std::max(slip, slip_of(segments_[i], setting).value_or(0.0));
+    slip = std::max(slip, slip_of(segments_[i], setting));  // nothing is less than any
     noise_.roll.common = std::max(noise_.roll.common, common_slip(*this, i, setting).value_or(0.0));
   }
-  if (slip > 0.0) noise_.roll = {slip, 2.0 * slip, noise_.roll.common};
+  if (slip) noise_.roll = {*slip, std::max(kLeastAside, 2.0 * *slip), noise_.roll.common};
 }
 
 void Batch::learn_from_pixels() {

@@ -10,7 +10,6 @@ namespace {
 
 constexpr double kShortest = 0.02;   // [m] of both wheels together
 constexpr std::size_t kFewest = 30;  // intervals
-constexpr double kLeast = 1e-4;      // [m/sqrt(m)]
 constexpr double kMedianToSigma = 1.4826;
 constexpr double kTwoPi = 6.283185307179586;
 
@@ -38,12 +37,34 @@ double robust_sigma(std::vector<double> values) {
   return kMedianToSigma * upper_median(values);
 }
 
+double slip_walk(const std::vector<WheelDifference>& differences) {
+  constexpr double kCut = 4.0;               // of a squared normalized error: a wheel that lost its grip counts no more
+  constexpr double kMeanOfCut = 0.92054;     // of min(z^2, 4), z standard normal
+  constexpr double kLargest = 1.0;           // [m/sqrt(m)]
+  const auto score = [&](double variance) {  // derivative of the log-likelihood by the slip's variance per metre
+    double sum = 0.0;
+    for (const WheelDifference& difference : differences) {
+      const double whole = difference.known + variance * difference.way;
+      const double squared = difference.error * difference.error / whole;
+      sum += difference.way / whole * (std::min(squared, kCut) / kMeanOfCut - 1.0);
+    }
+    return sum;
+  };
+  double low = 0.0, high = kLargest * kLargest;
+  if (!(score(low) > 0.0)) return 0.0;
+  for (int i = 0; i < 60; ++i) {
+    const double middle = 0.5 * (low + high);
+    (score(middle) > 0.0 ? low : high) = middle;
+  }
+  return std::sqrt(low);
+}
+
 std::optional<double> slip_of(const Segment& segment, const RollSetting& setting) {
   const WheelAngles angles(setting.encoder, segment.drive->encoders);
   const OdometerState& now = setting.now;
   const double count = kTwoPi / static_cast<double>(setting.encoder.resolution) * now.wheel_radius.mean();
   const double read = 2.0 * count * std::hypot(setting.encoder.noise_counts, 0.3);  // of two differences
-  std::vector<double> errors, known;
+  std::vector<WheelDifference> differences;
   for (const Keyframe& keyframe : segment.keyframes) {
     if (!keyframe.on_ground || keyframe.path.size() < 2) continue;
     const auto from = angles.angle(keyframe.t_ns);
@@ -57,13 +78,11 @@ std::optional<double> slip_of(const Segment& segment, const RollSetting& setting
     const double way = rolled.cwiseAbs().sum();
     if (way < kShortest) continue;
     const double yaw = now.track_width * turned.yaw;
-    errors.push_back((rolled(1) - rolled(0) - yaw) / std::sqrt(way));
     const double gyro = now.track_width * setting.imu.gyro_noise;
-    known.push_back((gyro * gyro * duration + read * read) / way);
+    differences.push_back({rolled(1) - rolled(0) - yaw, gyro * gyro * duration + read * read, way});
   }
-  if (errors.size() < kFewest) return std::nullopt;
-  const double sigma = robust_sigma(errors);
-  return std::sqrt(std::max(kLeast * kLeast, sigma * sigma - upper_median(known)));
+  if (differences.size() < kFewest) return std::nullopt;
+  return slip_walk(differences);
 }
 
 }  // namespace ear::calibration

@@ -77,9 +77,9 @@ void add_cameras(Parameters& parameters, const Calibration& given, const Priors&
   for (std::size_t i = 0; i < given.cameras.size(); ++i) {
     const CameraCalibration& camera = given.cameras[i];
     blocks.push_back(BlockMaker(parameters.lens[i].data(), "cam" + std::to_string(i))
-                         .add("focal length", "px", camera.fu, priors.focal_length, camera.fu)
-                         .add("principal point u", "px", 1.0, priors.principal_point, camera.cu)
-                         .add("principal point v", "px", 1.0, priors.principal_point, camera.cv)
+                         .add("focal length", "px", camera.fu, priors.focal_length[i], camera.fu)
+                         .add("principal point u", "px", 1.0, priors.principal_point[i], camera.cu)
+                         .add("principal point v", "px", 1.0, priors.principal_point[i], camera.cv)
                          .add("distortion k1", "", 1.0, priors.distortion, camera.distortion[0])
                          .add("distortion k2", "", 1.0, priors.distortion, camera.distortion[1])
                          .block());
@@ -141,8 +141,14 @@ Priors priors_of(const Calibration& given) {
   priors.camera_position = camera.position;
   priors.stereo_rotation = stereo.rotation;
   priors.stereo_position = stereo.position;
-  priors.focal_length = 5e-3;
-  priors.principal_point = 2.5;
+  priors.focal_length.fill(5e-3);
+  priors.principal_point.fill(2.5);
+  for (std::size_t i = 0; i < std::min<std::size_t>(given.cameras.size(), 2); ++i) {
+    const CameraCalibration& lens = given.cameras[i];
+    if (!lens.intrinsics_sigma) continue;
+    priors.focal_length[i] = lens.intrinsics_sigma->focal_length / lens.fu;
+    priors.principal_point[i] = lens.intrinsics_sigma->principal_point;
+  }
   priors.distortion = 2e-3;
   priors.camera_time = given.camera_time_offset_sigma.value_or(0.01);
   priors.encoder_time = 2e-3;
@@ -240,14 +246,16 @@ Parameters errors_of(const Calibration& given, const Calibration& truth) {
 
 Calibration with_priors(const Calibration& given, const Priors& priors) {
   Calibration result = given;
-  const double focal = given.cameras.empty() ? 400.0 : given.cameras[0].fu;
-  const double lens = priors.principal_point / focal;  // the filter has no lens: it counts as a rotation
+  for (std::size_t i = 0; i < result.cameras.size(); ++i) {
+    CameraCalibration& camera = result.cameras[i];
+    camera.intrinsics_sigma = IntrinsicsSigma{priors.focal_length[i] * camera.fu, priors.principal_point[i]};
+  }
   if (!result.cameras.empty()) {
-    result.cameras[0].pose_sigma = PoseSigma{std::hypot(priors.camera_rotation, lens), priors.camera_position};
+    result.cameras[0].pose_sigma = PoseSigma{priors.camera_rotation, priors.camera_position};
     result.camera_time_offset_sigma = priors.camera_time;
   }
   if (result.cameras.size() > 1) {
-    result.cameras[1].pose_sigma = PoseSigma{std::hypot(priors.stereo_rotation, lens), priors.stereo_position};
+    result.cameras[1].pose_sigma = PoseSigma{priors.stereo_rotation, priors.stereo_position};
   }
   if (result.encoder) {
     EncoderCalibration& encoder = *result.encoder;

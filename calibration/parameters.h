@@ -30,7 +30,8 @@ struct Parameters {
 /// What the values were known to before, as standard deviations, in the units of Parameters.
 struct Priors {
   double camera_rotation, camera_position, stereo_rotation, stereo_position;
-  double focal_length, principal_point, distortion, camera_time;
+  std::array<double, 2> focal_length, principal_point;  ///< of each camera
+  double distortion, camera_time;
   double wheel_radius, radius_difference, track_width;
   double axle_position, axle_rotation, encoder_time;
   double beam_origin, beam_direction, laser_time;

@@ -44,19 +44,15 @@ std::optional<double> mean_sigma(const std::vector<Finding>& findings, const std
 }
 
 Calibration with_sigmas(Calibration calibration, const std::vector<Finding>& findings) {
-  const auto lens = [&](const std::string& camera, double focal) {  // the filter counts it as a rotation
-    return mean_sigma(findings, camera + ": principal point").value_or(0.0) / focal;
-  };
-  if (!calibration.cameras.empty()) {
-    calibration.cameras[0].pose_sigma =
-        PoseSigma{std::hypot(degrees(findings, "cam0: rotation"), lens("cam0", calibration.cameras[0].fu)),
-                  thousandth(findings, "cam0: position")};
-    calibration.camera_time_offset_sigma = thousandth(findings, "cam0: time");
+  for (std::size_t i = 0; i < calibration.cameras.size(); ++i) {
+    const std::string name = "cam" + std::to_string(i);
+    CameraCalibration& camera = calibration.cameras[i];
+    camera.pose_sigma = PoseSigma{degrees(findings, name + ": rotation"), thousandth(findings, name + ": position")};
+    camera.intrinsics_sigma = IntrinsicsSigma{mean_sigma(findings, name + ": focal length").value_or(0.0),
+                                              mean_sigma(findings, name + ": principal point").value_or(0.0)};
   }
-  if (calibration.cameras.size() > 1) {
-    calibration.cameras[1].pose_sigma =
-        PoseSigma{std::hypot(degrees(findings, "cam1: rotation"), lens("cam1", calibration.cameras[1].fu)),
-                  thousandth(findings, "cam1: position")};
+  if (!calibration.cameras.empty()) {
+    calibration.camera_time_offset_sigma = thousandth(findings, "cam0: time");
   }
   if (calibration.encoder) {
     EncoderCalibration& encoder = *calibration.encoder;

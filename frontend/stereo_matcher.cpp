@@ -57,17 +57,22 @@ class Peaks {
   std::array<Hypothesis, 2> best_;
 };
 
-/// How far features may lie off their epipolar lines [px], by what is stated of the right camera's rotation.
-double epipolar_band(const CameraCalibration& right) {
+/// How far features may lie off their epipolar lines [px], by what is stated of the right camera's rotation and of both
+/// principal points.
+double epipolar_band(const CameraCalibration& left, const CameraCalibration& right) {
   constexpr double kSigmas = 3.0;
+  const auto centre = [](const CameraCalibration& camera) {
+    return camera.intrinsics_sigma ? camera.intrinsics_sigma->principal_point : 0.0;
+  };
   const double rotation = right.pose_sigma ? right.pose_sigma->rotation : 0.0;
-  return std::clamp(kSigmas * rotation * right.fv, kMaxEpipolarPx, kWidestEpipolarPx);
+  const double sigma = std::hypot(rotation * right.fv, centre(left), centre(right));
+  return std::clamp(kSigmas * sigma, kMaxEpipolarPx, kWidestEpipolarPx);
 }
 
 }  // namespace
 
 StereoMatcher::StereoMatcher(const CameraCalibration& left, const CameraCalibration& right, double nearest_depth)
-    : left_lens_(left), right_lens_(right), epipolar_band_px_(epipolar_band(right)) {
+    : left_lens_(left), right_lens_(right), epipolar_band_px_(epipolar_band(left, right)) {
   const Eigen::Isometry3d T_C1C0 = right.T_BC.inverse() * left.T_BC;
   right_from_left_ = {T_C1C0.linear(), T_C1C0.translation()};
   const double baseline = T_C1C0.translation().norm();

@@ -98,6 +98,9 @@ ear::CameraCalibration camera_of(const ear_camera& from) {
   std::copy_n(from.distortion, camera.distortion.size(), camera.distortion.begin());
   camera.rate_hz = from.rate_hz;
   camera.pose_sigma = pose_sigma_of(from.rotation_sigma, from.position_sigma);
+  if (from.focal_length_sigma != 0.0 || from.principal_point_sigma != 0.0) {
+    camera.intrinsics_sigma = ear::IntrinsicsSigma{from.focal_length_sigma, from.principal_point_sigma};
+  }
   return camera;
 }
 

@@ -30,6 +30,10 @@ void require_sigmas(const Calibration& calibration) {
   require_sigma(calibration.camera_time_offset_sigma, "calibration: camera_time_offset_sigma must be positive");
   for (const CameraCalibration& camera : calibration.cameras) {
     require_sigma(camera.pose_sigma, "calibration: a camera's pose_sigma must be positive");
+    if (const auto& lens = camera.intrinsics_sigma) {
+      require_sigma(lens->focal_length, "calibration: a camera's intrinsics_sigma must be positive");
+      require_sigma(lens->principal_point, "calibration: a camera's intrinsics_sigma must be positive");
+    }
   }
   require_sigma(calibration.imu.gyro_bias_sigma, "calibration: gyro_bias_sigma must be positive");
   require_sigma(calibration.imu.accel_bias_sigma, "calibration: accel_bias_sigma must be positive");
@@ -115,10 +119,6 @@ FilterConfig settings_for(const FilterConfig& config, const Calibration& calibra
   const std::vector<CameraCalibration>& cameras = calibration.cameras;
   if (!cameras.empty()) state_pose(cameras[0].pose_sigma, prior.camera_rotation, prior.camera_position);
   if (cameras.size() > 1) state_pose(cameras[1].pose_sigma, prior.stereo_rotation, prior.stereo_position);
-  if (cameras.size() > 1 && cameras[1].pose_sigma) {  // whoever measured it knows its lens
-    prior.focal_length = 0.0;
-    prior.principal_point = 0.0;
-  }
   if (const auto& encoder = calibration.encoder) {
     const double radius = 0.5 * (encoder->wheel_radius[0] + encoder->wheel_radius[1]);
     if (const auto& sigma = encoder->wheel_radius_sigma) {
@@ -141,6 +141,13 @@ FilterConfig settings_for(const FilterConfig& config, const Calibration& calibra
 double focal_length(const Calibration& calibration) {
   if (calibration.cameras.empty()) return 1.0;
   return 0.5 * (calibration.cameras[0].fu + calibration.cameras[0].fv);
+}
+
+Eigen::Vector3d lens_sigma(const PriorConfig& prior, const CameraCalibration& camera) {
+  const auto& stated = camera.intrinsics_sigma;
+  const double focal = stated ? stated->focal_length / camera.fu : prior.focal_length;
+  const double centre = stated ? stated->principal_point : prior.principal_point;
+  return {focal, centre / camera.fu, centre / camera.fv};
 }
 
 CameraState camera_state(const Calibration& calibration) {

@@ -23,6 +23,10 @@ inline constexpr double kKnownSigma = 1e-6;
 /// Pixels per unit of normalized coordinates; 1 without a camera, where nothing is measured in pixels.
 [[nodiscard]] double focal_length(const Calibration& calibration);
 
+/// Standard deviations of a lens before the first image, as stated or by the prior: focal length (relative), principal
+/// point over the focal length along u and v.
+[[nodiscard]] Eigen::Vector3d lens_sigma(const PriorConfig& prior, const CameraCalibration& camera);
+
 [[nodiscard]] CameraState camera_state(const Calibration& calibration);
 [[nodiscard]] OdometerState odometer_state(const Calibration& calibration);
 

@@ -207,15 +207,14 @@ Eigen::VectorXd Start::sigma() const {
     if (calibration_.cameras.size() == 2) {
       sigma.segment<3>(err::stereo).setConstant(prior.stereo_rotation);
       // The baseline scales with the size of the target that the cameras were calibrated with: large rigs are known to
-      // a share of it.
-      const Eigen::Array3d by_target = prior.focal_length * camera_state(calibration_).T_C0C1.p;
+      // a share of it. Where it is stated, that is in it.
+      const double share = calibration_.cameras[1].pose_sigma ? 0.0 : prior.focal_length;
+      const Eigen::Array3d by_target = share * camera_state(calibration_).T_C0C1.p;
       sigma.segment<3>(err::stereo + 3) = (by_target.square() + prior.stereo_position * prior.stereo_position).sqrt();
     }
   }
   for (std::size_t i = 0; online.intrinsics && i < calibration_.cameras.size(); ++i) {
-    const CameraCalibration& camera = calibration_.cameras[i];
-    sigma.segment<err::lens_size>(err::lens(static_cast<int>(i))) << prior.focal_length,
-        prior.principal_point / camera.fu, prior.principal_point / camera.fv;
+    sigma.segment<err::lens_size>(err::lens(static_cast<int>(i))) = lens_sigma(prior, calibration_.cameras[i]);
   }
   if (online.time_offset && !calibration_.cameras.empty()) sigma(err::time_offset) = prior.time_offset;
   if (uses_wheels()) {

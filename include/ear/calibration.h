@@ -26,6 +26,12 @@ struct PoseSigma {
   double position = 0.0;  ///< [m]
 };
 
+/// How well a lens is known.
+struct IntrinsicsSigma {
+  double focal_length = 0.0;     ///< of fu, and of fv by the same share [px]
+  double principal_point = 0.0;  ///< each axis [px]
+};
+
 struct CameraCalibration {
   Eigen::Isometry3d T_BC = Eigen::Isometry3d::Identity();  ///< camera (x right, y down, z forward) to body
   int width = 0;                                           ///< [px]
@@ -36,6 +42,7 @@ struct CameraCalibration {
   double rate_hz = 0.0;
   /// Of the left camera in the body; of the right one in the left one, which is known better than either in the body.
   std::optional<PoseSigma> pose_sigma;
+  std::optional<IntrinsicsSigma> intrinsics_sigma;
 };
 
 /// Continuous-time noise of the IMU, EuRoC's keys.

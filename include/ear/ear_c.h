@@ -49,6 +49,7 @@ typedef struct {
   double distortion[5]; /* OpenCV's order: k1 k2 p1 p2 k3, or k1 k2 k3 k4 0 */
   double rate_hz;
   double rotation_sigma, position_sigma; /* [rad, m] of T_BC; of the right camera in the left one; 0: not known */
+  double focal_length_sigma, principal_point_sigma; /* [px] of fu, of cu and cv; 0: not known */
 } ear_camera;
 
 typedef struct {

@@ -24,7 +24,7 @@ struct StandstillConfig {
 /// Standard deviations at the start, before anything was measured.
 struct PriorConfig {
   double gyro_bias = 0.1;           ///< [rad/s]
-  double accel_bias = 0.05;         ///< [m/s^2]
+  double accel_bias = 0.08;         ///< [m/s^2]
   double camera_rotation = 2.5e-3;  ///< [rad] camera 0 in the body, where it is estimated
   double camera_position = 1e-3;    ///< [m]
   double stereo_rotation = 2e-3;    ///< [rad] camera 1 in camera 0: rigs bend
@@ -34,7 +34,7 @@ struct PriorConfig {
   double time_offset = 2e-3;        ///< [s] camera against IMU
   double wheel_radius = 4e-3;       ///< of both wheels alike, relative
   double wheel_apart = 1e-3;        ///< of each wheel by itself, relative
-  double wheel_scale = 1e-2;        ///< of both wheels alike, relative, where neither camera nor lasers exist
+  double wheel_scale = 5e-2;        ///< of both wheels alike, relative, where neither camera nor lasers exist
   double track_width = 5e-3;        ///< relative
   double odometer_rotation = 5e-3;  ///< [rad] odometer in the body
   double odometer_unseen = 3e-2;    ///< [rad] the same without lasers, where it is what was guessed

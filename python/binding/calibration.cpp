@@ -18,11 +18,15 @@ void bind_camera(py::module_& module) {
       .value("equidistant", LensModel::equidistant);
   bind_value(module, "PoseSigma", "How well a pose is known: about [rad] and along [m] each axis.",
              Field{"rotation", &PoseSigma::rotation}, Field{"position", &PoseSigma::position});
+  bind_value(module, "IntrinsicsSigma", "How well a lens is known: focal length and principal point [px].",
+             Field{"focal_length", &IntrinsicsSigma::focal_length},
+             Field{"principal_point", &IntrinsicsSigma::principal_point});
   using C = CameraCalibration;
   bind_value(module, "CameraCalibration", "One camera: pose in the body, size and focal lengths [px], lens.",
              Field{"T_BC", &C::T_BC}, Field{"width", &C::width}, Field{"height", &C::height}, Field{"fu", &C::fu},
              Field{"fv", &C::fv}, Field{"cu", &C::cu}, Field{"cv", &C::cv}, Field{"lens", &C::lens},
-             Field{"distortion", &C::distortion}, Field{"rate_hz", &C::rate_hz}, Field{"pose_sigma", &C::pose_sigma});
+             Field{"distortion", &C::distortion}, Field{"rate_hz", &C::rate_hz}, Field{"pose_sigma", &C::pose_sigma},
+             Field{"intrinsics_sigma", &C::intrinsics_sigma});
 }
 
 void bind_imu(py::module_& module) {

@@ -59,6 +59,17 @@ std::optional<PoseSigma> pose_sigma(const YamlMap& map, const std::string& key) 
   return PoseSigma{*rotation, *position};
 }
 
+// {focal_length: px, principal_point: px}, both if any.
+std::optional<IntrinsicsSigma> intrinsics_sigma(const YamlMap& map) {
+  const char* const key = "intrinsics_sigma";
+  if (!map.has(key)) return std::nullopt;
+  const YamlMap both = map.child(key);
+  both.require_only({"focal_length", "principal_point"});
+  const std::optional<double> focal = both.sigma("focal_length"), centre = both.sigma("principal_point");
+  if (!focal || !centre) throw map.error(key, "{focal_length: px, principal_point: px} expected");
+  return IntrinsicsSigma{*focal, *centre};
+}
+
 // What EuRoC's sensor.yaml and Kalibr's camchain have in common; they differ in the key of the coefficients.
 CameraCalibration read_lens(const YamlMap& map, const std::string& coefficients_key) {
   const auto camera_model = map.get_or<std::string>("camera_model", "pinhole");
@@ -78,6 +89,7 @@ CameraCalibration read_lens(const YamlMap& map, const std::string& coefficients_
   camera.fv = intrinsics[1];
   camera.cu = intrinsics[2];
   camera.cv = intrinsics[3];
+  camera.intrinsics_sigma = intrinsics_sigma(map);
   camera.lens = *lens;
   if (lens_name != "none") camera.distortion = distortion_coefficients(map, coefficients_key, *lens);
   camera.rate_hz = map.get_or("rate_hz", 0.0);

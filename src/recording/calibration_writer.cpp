@@ -33,6 +33,12 @@ class SensorFile {
     file_ << key << ": {rotation: " << sigma->rotation << ", position: " << sigma->position << "}  # [rad, m]\n";
   }
 
+  void sigma(const std::string& key, const std::optional<IntrinsicsSigma>& sigma) {
+    if (!sigma) return;
+    file_ << key << ": {focal_length: " << sigma->focal_length << ", principal_point: " << sigma->principal_point
+          << "}  # [px]\n";
+  }
+
   template <typename Values>
   void list(const std::string& key, const Values& values, std::size_t count, const std::string& comment = "") {
     file_ << key << ": [";
@@ -129,6 +135,7 @@ void write_camera(const Calibration& calibration, std::size_t index, const fs::p
   file.list("resolution", std::array<int, 2>{camera.width, camera.height}, 2);
   file.value("camera_model", "pinhole");
   file.list("intrinsics", std::array<double, 4>{camera.fu, camera.fv, camera.cu, camera.cv}, 4, "fu, fv, cu, cv");
+  file.sigma("intrinsics_sigma", camera.intrinsics_sigma);
   const bool equidistant = camera.lens == LensModel::equidistant;
   file.value("distortion_model", equidistant ? "equidistant" : "radial-tangential");
   file.list("distortion_coefficients", camera.distortion, camera.distortion[4] != 0.0 && !equidistant ? 5 : 4);

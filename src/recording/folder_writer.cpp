@@ -49,6 +49,11 @@ class SensorFile {
     if (!value) return *this;
     return line(key, "{rotation: " + text(value->rotation) + ", position: " + text(value->position) + "}");
   }
+  SensorFile& sigma(const std::string& key, const std::optional<IntrinsicsSigma>& value) {
+    if (!value) return *this;
+    return line(key, "{focal_length: " + text(value->focal_length) +
+                         ", principal_point: " + text(value->principal_point) + "}");
+  }
 
  private:
   OutputFile file_;
@@ -63,6 +68,7 @@ void write_camera(const Calibration& calibration, std::size_t index, const fs::p
   file.line("resolution", list(std::array<double, 2>{double(camera.width), double(camera.height)}));
   file.line("camera_model", "pinhole");
   file.line("intrinsics", list(std::array<double, 4>{camera.fu, camera.fv, camera.cu, camera.cv}));
+  file.sigma("intrinsics_sigma", camera.intrinsics_sigma);
   file.line("distortion_model", fisheye ? "equidistant" : "radial-tangential");
   file.line("distortion_coefficients",
             list(std::vector<double>(camera.distortion.begin(), camera.distortion.begin() + coefficients)));

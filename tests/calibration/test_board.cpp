@@ -146,6 +146,13 @@ TEST_CASE("board: the standard deviations stand where the filter looks for them"
   CHECK(result.calibration.cameras[1].pose_sigma->position < 1e-4);
   CHECK(result.calibration.cameras[1].pose_sigma->rotation < 1e-3);
   CHECK_FALSE(result.calibration.cameras[0].pose_sigma);
+  for (const CameraCalibration& camera : result.calibration.cameras) {
+    REQUIRE(camera.intrinsics_sigma);
+    CHECK(camera.intrinsics_sigma->focal_length > 1e-3);
+    CHECK(camera.intrinsics_sigma->focal_length < 0.5);
+    CHECK(camera.intrinsics_sigma->principal_point > 1e-3);
+    CHECK(camera.intrinsics_sigma->principal_point < 0.5);
+  }
 }
 
 TEST_CASE("board: one camera alone") {

@@ -36,6 +36,16 @@ TEST_CASE("calibration: what sensor.yaml states is the prior; a sketch where it 
   CHECK(priors_of(given).wheel_radius == doctest::Approx(0.05));
   given.encoder->wheel_radius_sigma = 0.001;
   CHECK(priors_of(given).wheel_radius == doctest::Approx(0.001 / 0.075));
+  given.cameras.resize(2);
+  for (CameraCalibration& camera : given.cameras) camera.fu = camera.fv = 400.0;
+  given.cameras[1].intrinsics_sigma = IntrinsicsSigma{0.8, 0.3};
+  const Priors priors = priors_of(given);
+  CHECK(priors.focal_length[0] == doctest::Approx(5e-3));
+  CHECK(priors.focal_length[1] == doctest::Approx(2e-3));
+  CHECK(priors.principal_point[1] == 0.3);
+  const Calibration stated = with_priors(given, priors);
+  CHECK(stated.cameras[0].intrinsics_sigma->focal_length == doctest::Approx(2.0));
+  CHECK(stated.cameras[1].intrinsics_sigma->focal_length == doctest::Approx(0.8));
 }
 
 TEST_CASE("calibration: what hangs on a value that was not shown moves with it, and is as uncertain as that makes it") {

@@ -58,6 +58,20 @@ TEST_CASE("initial state: what is stated replaces the prior, the rest stays") {
   CHECK(prior.beam_offset == 0.021);
 }
 
+TEST_CASE("initial state: each lens is as well known as it states, whatever is stated of the cameras' poses") {
+  const PriorConfig prior;
+  Calibration calibration = vehicle();
+  const Eigen::Vector3d usual(prior.focal_length, prior.principal_point / 400.0, prior.principal_point / 400.0);
+  calibration.cameras[1].pose_sigma = PoseSigma{0.013, 0.014};
+  const FilterConfig config = settings_for(FilterConfig{}, calibration);
+  for (const CameraCalibration& camera : calibration.cameras) CHECK(lens_sigma(config.prior, camera) == usual);
+
+  calibration.cameras[1].fv = 500.0;
+  calibration.cameras[1].intrinsics_sigma = IntrinsicsSigma{0.8, 0.2};
+  CHECK(lens_sigma(config.prior, calibration.cameras[0]) == usual);
+  CHECK(lens_sigma(config.prior, calibration.cameras[1]).isApprox(Eigen::Vector3d(2e-3, 5e-4, 4e-4)));
+}
+
 TEST_CASE("initial state: mean and difference of the wheel radii are as well known as stated") {
   for (const double difference : {1e-5, 4e-4, 1.5e-3}) {
     CAPTURE(difference);
@@ -101,6 +115,8 @@ TEST_CASE("initial state: standard deviations that cannot be are named") {
   const auto names = [](const std::string& text, const char* field) { return text.find(field) != std::string::npos; };
   CHECK(reason([](C&) {}).empty());
   CHECK(names(reason([](C& c) { c.cameras[1].pose_sigma = PoseSigma{0.0, 0.1}; }), "pose_sigma"));
+  CHECK(names(reason([](C& c) { c.cameras[0].intrinsics_sigma = IntrinsicsSigma{-1.0, 1.0}; }), "intrinsics_sigma"));
+  CHECK(names(reason([](C& c) { c.cameras[1].intrinsics_sigma = IntrinsicsSigma{1.0, 0.0}; }), "intrinsics_sigma"));
   CHECK(names(reason([](C& c) { c.camera_time_offset_sigma = -1e-3; }), "camera_time_offset_sigma"));
   CHECK(names(reason([](C& c) { c.imu.gyro_bias_sigma = std::numeric_limits<double>::quiet_NaN(); }), "gyro_bias"));
   CHECK(names(reason([](C& c) { c.imu.accel_bias_sigma = std::numeric_limits<double>::infinity(); }), "accel_bias"));

@@ -441,6 +441,8 @@ TEST_CASE("C interface: what cannot be used is refused with its reason") {
   }
   CHECK(reason_of([](C& c, S&) { c.wheel_radius_sigma = -1e-3; }).find("wheel_radius_sigma") != std::string::npos);
   CHECK(reason_of([](C& c, S&) { c.cameras[1].rotation_sigma = 1e-3; }).find("pose_sigma") != std::string::npos);
+  CHECK(reason_of([](C& c, S&) { c.cameras[1].focal_length_sigma = 0.5; }).find("intrinsics_sigma") !=
+        std::string::npos);
   CHECK(reason_of([](C&, S& s) { s.window = 1; }).find("filter.window") != std::string::npos);
   CHECK(reason_of([](C&, S& s) { s.frame_slots = 0; }).find("frame_slots") != std::string::npos);
   CHECK(reason_of([](C&, S& s) { s.queue_seconds = std::nan(""); }).find("queue_seconds") != std::string::npos);

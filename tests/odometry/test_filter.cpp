@@ -287,6 +287,22 @@ TEST_CASE("filter: an unknown focal length counts as a baseline that is less wel
   CHECK(sigma(prior.focal_length).x() == doctest::Approx(3e-5).epsilon(0.02));
 }
 
+TEST_CASE(
+    "filter: a lens that a calibration did not show keeps its prior, one that it showed is as well known as stated") {
+  const simulator::Simulation simulation = simulate("static", 3.0);  // at rest lenses do not show
+  Calibration calibration = simulation.calibration();
+  calibration.cameras[1].pose_sigma = PoseSigma{1e-4, 3e-5};
+  calibration.cameras[1].intrinsics_sigma = IntrinsicsSigma{0.02, 0.01};
+  const PriorConfig prior;
+  Filter filter(FilterConfig{}, calibration);
+  run_filter(filter, simulation);
+  const Eigen::VectorXd sigma = filter.ekf().covariance().matrix().diagonal().cwiseSqrt();
+  CHECK(sigma(err::lens(0)) == doctest::Approx(prior.focal_length).epsilon(0.1));
+  CHECK(sigma(err::lens(0) + 1) == doctest::Approx(prior.principal_point / calibration.cameras[0].fu).epsilon(0.1));
+  CHECK(sigma(err::lens(1)) == doctest::Approx(0.02 / calibration.cameras[1].fu).epsilon(0.1));
+  CHECK(sigma(err::lens(1) + 2) == doctest::Approx(0.01 / calibration.cameras[1].fv).epsilon(0.1));
+}
+
 TEST_CASE("filter: a gap in the inertial data is counted and survived") {
   const simulator::Simulation simulation = simulate("flat1", 15.0);
   Filter filter(FilterConfig{}, simulation.calibration());

@@ -296,7 +296,9 @@ TEST_CASE("calibration: standard deviations beside the values") {
   CHECK_FALSE(load(folder.path()).encoder->wheel_radius_sigma);
 
   append("cam0", "T_BS_sigma: {rotation: 0.002, position: 0.001}\ntimeshift_cam_imu_sigma: 0.0005\n");
-  append("cam1", "T_C0C1_sigma: {rotation: 0.0003, position: 0.00005}\n");
+  append("cam1",
+         "T_C0C1_sigma: {rotation: 0.0003, position: 0.00005}\n"
+         "intrinsics_sigma: {focal_length: 0.4, principal_point: 0.2}\n");
   append("imu0", "gyroscope_bias_sigma: 0.01\naccelerometer_bias_sigma: 0.2\n");
   append("encoder0",
          "T_BS_sigma: {rotation: 0.004, position: 0.003}\nwheel_radius_sigma: 0.0003\n"
@@ -308,6 +310,10 @@ TEST_CASE("calibration: standard deviations beside the values") {
   CHECK(c.cameras[0].pose_sigma->position == 0.001);
   REQUIRE(c.cameras[1].pose_sigma);
   CHECK(c.cameras[1].pose_sigma->position == 0.00005);
+  CHECK_FALSE(c.cameras[0].intrinsics_sigma);
+  REQUIRE(c.cameras[1].intrinsics_sigma);
+  CHECK(c.cameras[1].intrinsics_sigma->focal_length == 0.4);
+  CHECK(c.cameras[1].intrinsics_sigma->principal_point == 0.2);
   CHECK(c.camera_time_offset_sigma == 0.0005);
   CHECK(c.imu.gyro_bias_sigma == 0.01);
   CHECK(c.imu.accel_bias_sigma == 0.2);
@@ -341,6 +347,14 @@ TEST_CASE("calibration: standard deviations that cannot be are errors that name 
   CHECK(contains(error_with("cam0", "T_BS_sigma: 0.1"), "T_BS_sigma: keys and values expected"));
   CHECK(contains(error_with("cam0", "T_BS_sigma: {rotation: 0.1, positon: 0.1}"),
                  "T_BS_sigma.positon: there is no such"));
+  CHECK(contains(error_with("cam0", "intrinsics_sigma: 0.5"), "intrinsics_sigma: keys and values expected"));
+  CHECK(contains(error_with("cam0", "intrinsics_sigma: [1, 1, 1, 1]"), "intrinsics_sigma: keys and values expected"));
+  CHECK(contains(error_with("cam1", "intrinsics_sigma: {focal_length: 0.4}"),
+                 ": intrinsics_sigma: {focal_length: px, principal_point: px} expected"));
+  CHECK(contains(error_with("cam1", "intrinsics_sigma: {focal_length: 0, principal_point: 0.2}"),
+                 "intrinsics_sigma.focal_length: '0' is not positive"));
+  CHECK(contains(error_with("cam1", "intrinsics_sigma: {focal_length: 0.4, principal_point: 0.2, fu: 1}"),
+                 "intrinsics_sigma.fu: there is no such"));
   CHECK(contains(error_with("cam0", "timeshift_cam_imu_sigma: soon"), "'soon' is not a number"));
   CHECK(contains(error_with("cam1", "T_BS_sigma: {rotation: 0.1, position: 0.1}"), "T_C0C1_sigma"));
 }
@@ -351,13 +365,17 @@ TEST_CASE("kalibr: standard deviations beside its values") {
   replace_in(
       folder / "chain.yaml", "  cam_overlaps",
       "  T_cam_imu_sigma: {rotation: 0.002, position: 0.001}\n  timeshift_cam_imu_sigma: 0.0004\n  cam_overlaps");
-  replace_in(folder / "chain.yaml", "cam1:\n", "cam1:\n  T_cn_cnm1_sigma: {rotation: 0.0003, position: 0.00004}\n");
+  replace_in(folder / "chain.yaml", "cam1:\n",
+             "cam1:\n  T_cn_cnm1_sigma: {rotation: 0.0003, position: 0.00004}\n"
+             "  intrinsics_sigma: {focal_length: 0.4, principal_point: 0.2}\n");
   write_text(folder / "imu.yaml", kKalibrImu + "gyroscope_bias_sigma: 0.02\n");
   const Calibration c = load_kalibr(folder / "chain.yaml", folder / "imu.yaml");
   REQUIRE(c.cameras[0].pose_sigma);
   CHECK(c.cameras[0].pose_sigma->rotation == 0.002);
   REQUIRE(c.cameras[1].pose_sigma);
   CHECK(c.cameras[1].pose_sigma->position == 0.00004);
+  REQUIRE(c.cameras[1].intrinsics_sigma);
+  CHECK(c.cameras[1].intrinsics_sigma->principal_point == 0.2);
   CHECK(c.camera_time_offset_sigma == 0.0004);
   CHECK(c.imu.gyro_bias_sigma == 0.02);
 }
@@ -371,6 +389,7 @@ TEST_CASE("calibration: what is written comes back, in the place of the recordin
   c.cameras[0].distortion[4] = 0.05;
   c.cameras[0].lens = LensModel::radial_tangential;
   c.cameras[1].pose_sigma = PoseSigma{1e-4, 2e-4};
+  c.cameras[0].intrinsics_sigma = IntrinsicsSigma{0.3, 0.25};
   c.camera_time_offset = -0.003;
   c.camera_time_offset_sigma = 1e-4;
   c.imu.gyro_noise = 0.002;
@@ -395,6 +414,10 @@ TEST_CASE("calibration: what is written comes back, in the place of the recordin
     CHECK(b.lens == a.lens);
     CHECK(b.rate_hz == a.rate_hz);
   }
+  REQUIRE(back.cameras[0].intrinsics_sigma);
+  CHECK(back.cameras[0].intrinsics_sigma->focal_length == 0.3);
+  CHECK(back.cameras[0].intrinsics_sigma->principal_point == 0.25);
+  CHECK_FALSE(back.cameras[1].intrinsics_sigma);
   CHECK(back.cameras[1].pose_sigma->rotation == 1e-4);
   CHECK(back.cameras[1].pose_sigma->position == 2e-4);
   CHECK(back.camera_time_offset == -0.003);

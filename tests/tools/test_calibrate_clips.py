@@ -47,6 +47,15 @@ class Calibrate(unittest.TestCase):
             self.assertFalse(parameters[hidden]["shown"], hidden)
             self.assertNotEqual(parameters[hidden]["motion_wanted"], "")
 
+    def test_clock_of_a_car_s_cameras(self):
+        """The inertial samples are 53 ms late against the attitude that the same device gives, which the cameras follow."""
+        found = self.calibrated("calibration.json", self.recording("kitti_a"))
+        parameters = {parameter["name"]: parameter for parameter in found["parameters"]}
+        clock = parameters["cam0: time offset"]
+        self.assertTrue(clock["shown"])
+        self.assertLess(clock["posterior_sigma"], 3.0)
+        self.assertLess(abs(clock["given"] + clock["change"] - 53.0), 10.0)  # [ms]; the cameras' trigger lasts some too
+
     def test_noise_of_a_simulated_imu(self):
         """2.5 s at rest, with 1e-3 rad/s/sqrt(Hz) and 1e-2 m/s^2/sqrt(Hz)."""
         noise = self.calibrated("imu_noise.json", "--imu", self.recording("hop"))

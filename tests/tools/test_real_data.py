@@ -6,6 +6,7 @@ test_real_data.py ROOT EAR_PROGRAM [TEST...]
 import array
 import json
 import math
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -16,7 +17,8 @@ ROOT = Path(sys.argv.pop(1)).resolve()
 PROGRAM = Path(sys.argv.pop(1)).resolve()
 CLIPS = ROOT / "../shared/data"
 sys.path.insert(0, str(ROOT / "tools"))
-from real.layout import matrix, quaternion  # noqa: E402
+from real import reference  # noqa: E402
+from real.layout import BadInput, matrix, quaternion  # noqa: E402
 
 EUROC_YAML = "T_BS:\n  data: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]\n"
 # Of 2011_09_26, and what follows from it for the rectified grey cameras: their places in the body [m].
@@ -250,6 +252,69 @@ class Comma(RealData):
     def test_missing_file(self):
         (self.work / "s/global_pose/frame_positions").unlink()
         self.assert_refused("comma2k19", "s", "global_pose/frame_positions: is missing")
+
+
+class References(RealData):
+    """A truth of a body that swings and turns, and inertial samples of it."""
+
+    def recording(self, late_s=0.0, lever=(0.0, 0.0, 0.0), climb_m_s=0.0):
+        folder = self.work / "swinging"
+        for name in ("imu0", "state_groundtruth_estimate0"):
+            (folder / "mav0" / name).mkdir(parents=True)
+
+        def pose(t):  # position, velocity, acceleration, heading, its rate
+            p = [math.sin(2.0 * t), math.cos(1.3 * t), 0.3 * math.sin(3.1 * t)]
+            v = [2.0 * math.cos(2.0 * t), -1.3 * math.sin(1.3 * t), 0.93 * math.cos(3.1 * t)]
+            a = [-4.0 * p[0], -1.69 * p[1], -9.61 * p[2]]
+            return p, v, a, 0.8 * math.sin(1.7 * t), 1.36 * math.cos(1.7 * t)
+
+        def write(name, rows):
+            lines = [",".join([str(round(1e9 * t)), *(repr(x) for x in values)]) for t, values in rows]
+            (folder / "mav0" / name / "data.csv").write_text("# of a test\n" + "\n".join(lines) + "\n", encoding="utf-8")
+
+        imu, truth = [], []
+        for k in range(1600):
+            _, _, a, heading, rate = pose(k / 200)
+            c, s = math.cos(heading), math.sin(heading)
+            imu.append((k / 200, [0.02, -0.01, rate + 0.05, c * a[0] + s * a[1] + 0.1, -s * a[0] + c * a[1], a[2] + 9.81]))
+        for k in range(10, 790):
+            t = k / 100
+            p, v, _, _, _ = pose(t - late_s)
+            heading = pose(t)[3]
+            c, s = math.cos(heading), math.sin(heading)
+            p[0] += c * lever[0] - s * lever[1]
+            p[1] += s * lever[0] + c * lever[1]
+            p[2] += lever[2] + climb_m_s * min(max(t - 3.0, 0.0), 2.0)
+            truth.append((t, [*p, math.cos(heading / 2), 0.0, 0.0, math.sin(heading / 2), *v]))
+        write("imu0", imu)
+        write("state_groundtruth_estimate0", truth)
+        return folder
+
+    def test_sound(self):
+        figures = reference.judge(self.recording(lever=(0.05, -0.02, 0.1)))
+        self.assertLess(figures["turn_scatter_rad"], 1e-3)
+        self.assertLess(figures["worst_velocity_m_s"], 0.15)  # of the lever
+        self.assertEqual(figures["delay_s"], 0.0)
+        self.assertLess(figures["position_scatter_m"], 1e-4)
+
+    def test_late_positions(self):
+        for late_s in (0.008, -0.013):
+            figures = reference.judge(self.recording(late_s=late_s))
+            self.assertAlmostEqual(figures["delay_s"], late_s, delta=1.1e-3)
+            shutil.rmtree(self.work / "swinging")
+
+    def test_positions_that_contradict_velocities(self):
+        self.assertAlmostEqual(reference.judge(self.recording(climb_m_s=0.35))["worst_velocity_m_s"], 0.35, delta=0.01)
+
+    def test_bad_input(self):
+        folder = self.recording()
+        path = folder / "mav0/state_groundtruth_estimate0/data.csv"
+        path.write_text(path.read_text(encoding="utf-8") + "9000000000,1,2,3\n", encoding="utf-8")
+        with self.assertRaisesRegex(BadInput, "data.csv:782: .*torn"):
+            reference.judge(folder)
+        path.write_text("1,2,3\n", encoding="utf-8")
+        with self.assertRaisesRegex(BadInput, "q_w"):
+            reference.judge(folder)
 
 
 class Tool(RealData):

@@ -47,9 +47,11 @@ class CamerasAsStated {
 Calibration for_search(Calibration calibration) {
   if (calibration.cameras.size() < 2) return calibration;
   const Priors priors = priors_of(calibration);
-  CameraCalibration& right = calibration.cameras[1];
-  const double lens = std::sqrt(2.0) * priors.principal_point / right.fv;
-  right.pose_sigma = PoseSigma{std::hypot(priors.stereo_rotation, lens), priors.stereo_position};
+  calibration.cameras[1].pose_sigma = PoseSigma{priors.stereo_rotation, priors.stereo_position};
+  for (std::size_t i = 0; i < 2; ++i) {
+    CameraCalibration& camera = calibration.cameras[i];
+    camera.intrinsics_sigma = IntrinsicsSigma{priors.focal_length[i] * camera.fu, priors.principal_point[i]};
+  }
   return calibration;
 }
 

@@ -11,8 +11,8 @@ Priors drawn_priors(double factor) {
   priors.camera_position = factor * 1e-3;
   priors.stereo_rotation = factor * 0.02 * kDegree;
   priors.stereo_position = factor * 5e-5;
-  priors.focal_length = factor * 1e-3;
-  priors.principal_point = factor * 0.5;
+  priors.focal_length.fill(factor * 1e-3);
+  priors.principal_point.fill(factor * 0.5);
   priors.distortion = 1e-3;
   priors.camera_time = factor * 2e-3;
   priors.wheel_radius = factor * 4e-3;

@@ -3,6 +3,7 @@
 from real.catalogue import DATA_SETS, HELD
 from real.altered import table as altered_table
 from real.judge import table
+from real.reference import table as reference_table
 
 HEAD = """# Real recordings
 
@@ -13,6 +14,7 @@ This page is written by `tools/real_data report`; do not edit it.
     tools/real_data convert euroc MH_01_easy   # a local copy of the original to our layout
     tools/real_data run                        # all in ../shared/data, or those named, by name or folder
     tools/real_data alter                      # the same with something wrong in them (last section)
+    tools/real_data references                 # how good their truth is (section below)
     tools/real_data report
 
 The figures are defined in [evaluation.md](evaluation.md), *far off* and *false tracking* in [its section](evaluation.md#false-tracking); positions are
@@ -69,10 +71,21 @@ the position is far off. "none": no estimate, with a reason in words; empty: the
 """
 
 
-def page(results, altered=None):
+REFERENCES = """## How good the truths are
+
+`tools/real_data references` judges each truth by the recording's own inertial samples and by itself; no estimate is in it. How much turns over a second differ
+from the gyroscope's, its bias taken out; by how much the positions and the truth's own velocities contradict each other over the worst second; by how much
+later the positions are than the accelerometer, integrated twice over 0.3 s with gravity, bias and a lever fitted, and what is then left. `hop` is simulated: its
+row shows what the inertial samples' noise does. "-": no velocities, or gaps. What it means for the figures above:
+[decision 31](decisions/0031-priors-as-real-sensors-are.md).
+"""
+
+
+def page(results, altered=None, references=None):
     judged = [(r["name"], r["figures"] and {**r["figures"], "alarms_per_hour": r["alarms_per_hour"]}) for r in results]
     return "\n".join([HEAD, table(judged), "", *notes(results), "",
-                      *([ALTERED, altered_table(altered["results"], altered["names"]), ""] if altered else []), "## Data sets", "", data_sets(), "",
+                      *([ALTERED, altered_table(altered["results"], altered["names"]), ""] if altered else []),
+                      *([REFERENCES, reference_table(references), ""] if references else []), "## Data sets", "", data_sets(), "",
                       *lines_of("The converters read every row and name file, line and field of what is wrong; images are linked, not "
                                 "copied. That of comma2k19 makes, of the example segment in its repository, the recording above: the same "
                                 "samples and truth, and counts that are at most one off. That of kitti_raw has calibrations as above, but "

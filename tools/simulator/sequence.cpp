@@ -349,12 +349,12 @@ Sequence calibrate() {
   add({turn(0.9, 360, 0.8), turn(0.9, -360, 0.8), turn(0.9, 360, 0.9), turn(0.9, -360, 0.9), stand(1.0)});
   add({drive(4.0, 1.0), stand(0.6), reverse(4.0, 1.0), stand(1.0)});
   add({take_off(0.6, 1.5)});  // low and high: a beam's origin is told from its direction
-  shake(7, 0);
+  shake(12, 6);
   add({stand(0.8), land(0.6), stand(1.5), sway(6.0, 10.0)});
   add({take_off(2.2, 3.0)});
-  shake(9, 7);
+  shake(5, 8);
   add({in_air(spin(90, 0.9))});
-  shake(8, 0);
+  shake(5, 0);
   add({in_air(spin(-90, 0.9)), stand(0.8), land(2.2), stand(1.5)});
   add({spin(90, 0.9), drive(2.0, 1.0), stand(0.6), reverse(2.0, 0.8), stand(3.0)});
   return {
