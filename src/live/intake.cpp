@@ -1,6 +1,7 @@
 #include "src/live/intake.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -106,7 +107,7 @@ std::string Intake::rates() const {
   std::string text;
   for (const StreamWatch* stream : streams()) {
     text += (text.empty() ? "" : ", ") + stream->name() + " ";
-    text += stream->silent() ? "silent" : std::to_string(static_cast<int>(stream->rate_hz() + 0.5)) + " Hz";
+    text += stream->silent() ? "silent" : std::to_string(std::lround(stream->rate_hz())) + " Hz";
   }
   return text;
 }

@@ -1,11 +1,11 @@
 #include "src/live/live_estimator.h"
 
 #include <pthread.h>
-#include <time.h>
 
 #include <algorithm>
 #include <cerrno>
 #include <cmath>
+#include <ctime>
 #include <limits>
 #include <utility>
 
