@@ -5,10 +5,8 @@
 namespace ear {
 namespace {
 
-constexpr double kUnaided = 2.0;         // [s] chosen: that inertia alone may carry the estimate
 constexpr double kWorstVelocity = 1.0;   // [m/s] chosen: standard deviation of a velocity that is known,
 constexpr double kWorstDirection = 0.2;  // [rad] chosen: or of its direction, if more; a fast one may be less exact
-constexpr double kContradicted = 1.0;    // [s] chosen
 constexpr double kPrecise = 0.05;       // chosen: of the path: two standard deviations of the position, while tracking,
 constexpr double kPreciseEnough = 0.1;  // [m] chosen: or this, if more
 constexpr double kFastest = 100.0;      // [m/s] chosen: no vehicle with wheels and rotors is faster
@@ -192,7 +190,7 @@ void HealthMonitor::decide(TimeNs t_ns) {
                    ((last_.statistics.tracks >= kFewFeatures && last_.agreement.contradicts()) || images_.misfit());
   if (!off || (fresh && wheels_carry(last_.statistics))) life_.fitting_ns = t_ns;
   if (off || health_.aiding == Aiding::none || !last_.running) life_.unproven_ns = t_ns;
-  life_.contradicted = last_.running && seconds_between(life_.fitting_ns, t_ns) > kContradicted;
+  life_.contradicted = last_.running && seconds_between(life_.fitting_ns, t_ns) > ImageHealth::kFitMemory;
 
   health_.faulty.reset();
   for (std::size_t i = 0; i < kSourceCount; ++i) {
@@ -201,7 +199,7 @@ void HealthMonitor::decide(TimeNs t_ns) {
     health_.faulty.set(i);
     health_.onset_ns[i] = fault.onset_ns();
   }
-  const bool usable = last_.running && last_.possible && seconds_between(life_.aided_ns, t_ns) < kUnaided &&
+  const bool usable = last_.running && last_.possible && seconds_between(life_.aided_ns, t_ns) < kLostAfter &&
                       velocity_known() && !life_.contradicted;
   const bool proven = !lost() || seconds_between(life_.unproven_ns, t_ns) >= FaultState::kSoundAfter;
   const double sigma = std::max(health_.horizontal_sigma, health_.vertical_sigma);
@@ -225,7 +223,7 @@ Reason HealthMonitor::reason(TimeNs t_ns) const {
   if (!life_.started) return Reason::vague_velocity;
   if (!last_.possible) return Reason::not_a_number;
   if (life_.contradicted) return Reason::images_contradict;
-  if (seconds_between(life_.aided_ns, t_ns) >= kUnaided) return Reason::inertia_alone;
+  if (seconds_between(life_.aided_ns, t_ns) >= kLostAfter) return Reason::inertia_alone;
   return velocity_known() ? Reason::proving : Reason::velocity_lost;
 }
 

@@ -13,7 +13,6 @@ constexpr double kNoisy = 1.5;          // chosen: times the usual noise of a fe
 constexpr double kFewStereo = 0.25;     // chosen: of the features; less are seen by the right camera
 constexpr double kSparse = 0.4;         // chosen: of the usual number of features
 constexpr double kTracksMemory = 20.0;  // [s] chosen
-constexpr double kFitMemory = 1.0;      // [s] chosen
 constexpr double kIntervalShare = 0.1;  // chosen: of each new interval in the usual one
 
 /// Left and right are exchanged: the stereo features seem to be behind the cameras.

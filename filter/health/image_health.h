@@ -14,6 +14,7 @@ namespace ear {
 class ImageHealth {
  public:
   static constexpr double kManyOff = 0.3;  // chosen: of the features off their place; images carry the estimate no more
+  static constexpr double kFitMemory = 1.0;  // [s] chosen: of what fits; contradicted for so long, the state is lost
 
   /// `cameras`: 0 to 2.
   explicit ImageHealth(std::size_t cameras) : cameras_(cameras) {}

@@ -15,9 +15,8 @@ constexpr double kStampJitter = 0.01;     // [s] chosen: by which a reading may 
 constexpr double kLargestRange = 1000.0;  // [m] chosen: of a laser; more is a wrong unit
 constexpr double kWidestView = 100.0;     // chosen: tan of the angle off the axis, nothing is seen at 89.4 deg
 constexpr std::int64_t kLargestCount = std::int64_t{1} << 60;  // chosen: differences of counters must not overflow
-constexpr double kFarAhead = 0.5;   // [s] chosen: farther ahead of the inertial samples it is a false stamp
-constexpr double kTooLate = 0.1;    // [s] chosen: behind the state; a reading that comes later is not used
-constexpr double kLostAfter = 2.0;  // [s] chosen: without inertial samples; where the vehicle is now nobody knows
+constexpr double kFarAhead = 0.5;  // [s] chosen: farther ahead of the inertial samples it is a false stamp
+constexpr double kTooLate = 0.1;   // [s] chosen: behind the state; a reading that comes later is not used
 
 }  // namespace
 

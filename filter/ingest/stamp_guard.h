@@ -12,6 +12,8 @@ namespace ear {
 inline constexpr double kStreamGap = 0.25;
 /// [s] chosen: what a sensor showed so long ago shows nothing of now.
 inline constexpr double kStale = 0.5;
+/// [s] chosen: without inertial samples, or with nothing but these, for so long, and the state is lost.
+inline constexpr double kLostAfter = 2.0;
 /// Chosen: so many samples in a row confirm each other; one may have a false stamp.
 inline constexpr int kConfirmed = 3;
 /// Chosen: one sample may be lost; so many of the usual intervals are a gap.
