@@ -30,9 +30,9 @@ TEST_CASE("configurations: what changes the estimate changes the text, and a nam
   CHECK(settings_text(all).find("odometer.model: terrain\n") != std::string::npos);
 }
 
-TEST_CASE("configurations: without lasers the estimator is told of none") {
+TEST_CASE("configurations: without lasers the estimator is given none") {
   Calibration calibration;
   calibration.lasers.emplace();
-  CHECK(told(find_configuration("default"), calibration).lasers);
-  CHECK_FALSE(told(find_configuration("no-lasers"), calibration).lasers);
+  CHECK(given(find_configuration("default"), calibration).lasers);
+  CHECK_FALSE(given(find_configuration("no-lasers"), calibration).lasers);
 }

@@ -1,4 +1,4 @@
-// The calibration that the estimator is told: as wrong as is promised, and the drive does not depend on it.
+// The calibration that the estimator is given: as wrong as is promised, and the drive does not depend on it.
 #include <doctest/doctest.h>
 
 #include <Eigen/Core>
@@ -41,42 +41,42 @@ void add(std::vector<double>& list, const Eigen::VectorXd& values) {
   list.insert(list.end(), values.data(), values.data() + values.size());
 }
 
-/// How far what is told is off, by name.
-void add_differences(const ear::Calibration& truth, const ear::Calibration& told, Draws& draws) {
+/// How far what is given is off, by name.
+void add_differences(const ear::Calibration& truth, const ear::Calibration& given, Draws& draws) {
   const Eigen::Isometry3d& T_BC = truth.cameras[0].T_BC;
-  add(draws["rig rotation [deg]"], turned(T_BC.linear(), told.cameras[0].T_BC.linear()));
-  add(draws["rig position [mm]"], 1e3 * (told.cameras[0].T_BC.translation() - T_BC.translation()));
-  const Eigen::Isometry3d told_pair = told.cameras[0].T_BC.inverse() * told.cameras[1].T_BC;
+  add(draws["rig rotation [deg]"], turned(T_BC.linear(), given.cameras[0].T_BC.linear()));
+  add(draws["rig position [mm]"], 1e3 * (given.cameras[0].T_BC.translation() - T_BC.translation()));
+  const Eigen::Isometry3d given_pair = given.cameras[0].T_BC.inverse() * given.cameras[1].T_BC;
   const Eigen::Isometry3d true_pair = T_BC.inverse() * truth.cameras[1].T_BC;
-  add(draws["stereo rotation [deg]"], turned(true_pair.linear(), told_pair.linear()));
-  add(draws["stereo position [mm]"], 1e3 * (told_pair.translation() - true_pair.translation()));
+  add(draws["stereo rotation [deg]"], turned(true_pair.linear(), given_pair.linear()));
+  add(draws["stereo position [mm]"], 1e3 * (given_pair.translation() - true_pair.translation()));
   const std::string sides[] = {"left ", "right "};
   for (std::size_t i = 0; i < 2; ++i) {
     const ear::CameraCalibration& a = truth.cameras[i];
-    const ear::CameraCalibration& b = told.cameras[i];
+    const ear::CameraCalibration& b = given.cameras[i];
     draws[sides[i] + "focal length [%]"].push_back(1e2 * (b.fu / a.fu - 1.0));
     CHECK(b.fv / a.fv == doctest::Approx(b.fu / a.fu).epsilon(1e-12));
     add(draws[sides[i] + "principal point [px]"], Eigen::Vector2d(b.cu - a.cu, b.cv - a.cv));
     CHECK(b.distortion == a.distortion);
   }
 
-  const double left = 1e2 * (told.encoder->wheel_radius[0] / truth.encoder->wheel_radius[0] - 1.0);
-  const double right = 1e2 * (told.encoder->wheel_radius[1] / truth.encoder->wheel_radius[1] - 1.0);
+  const double left = 1e2 * (given.encoder->wheel_radius[0] / truth.encoder->wheel_radius[0] - 1.0);
+  const double right = 1e2 * (given.encoder->wheel_radius[1] / truth.encoder->wheel_radius[1] - 1.0);
   draws["radius in common [%]"].push_back(0.5 * (left + right));
   draws["radius apart [%]"].push_back(left - right);
-  draws["track width [%]"].push_back(1e2 * (told.encoder->track_width / truth.encoder->track_width - 1.0));
-  add(draws["odometer rotation [deg]"], turned(truth.encoder->T_BO.linear(), told.encoder->T_BO.linear()));
-  add(draws["odometer position [mm]"], 1e3 * (told.encoder->T_BO.translation() - truth.encoder->T_BO.translation()));
+  draws["track width [%]"].push_back(1e2 * (given.encoder->track_width / truth.encoder->track_width - 1.0));
+  add(draws["odometer rotation [deg]"], turned(truth.encoder->T_BO.linear(), given.encoder->T_BO.linear()));
+  add(draws["odometer position [mm]"], 1e3 * (given.encoder->T_BO.translation() - truth.encoder->T_BO.translation()));
   for (std::size_t i = 0; i < 3; ++i) {
     const ear::LaserBeam& a = truth.lasers->beams[i];
-    const ear::LaserBeam& b = told.lasers->beams[i];
+    const ear::LaserBeam& b = given.lasers->beams[i];
     CHECK(b.d_B.norm() == doctest::Approx(1.0).epsilon(1e-12));
     const Eigen::Vector3d side = a.d_B.unitOrthogonal();  // a turn about the beam itself cannot be seen
     add(draws["beam " + std::to_string(i) + " direction [deg]"],
         Eigen::Vector2d(side.dot(b.d_B), a.d_B.cross(side).dot(b.d_B)) / kDegree);
     add(draws["beam " + std::to_string(i) + " origin [mm]"], 1e3 * (b.p_BL - a.p_BL));
   }
-  draws["time [ms]"].push_back(1e3 * (told.camera_time_offset - truth.camera_time_offset));
+  draws["time [ms]"].push_back(1e3 * (given.camera_time_offset - truth.camera_time_offset));
 }
 
 /// Of all seeds.
@@ -103,7 +103,7 @@ Options short_run(std::optional<double> calibration_error) {
 }
 
 /// All but the accelerometer, bit for bit.
-/// Where it was seen: features are normalized with the lens that is told.
+/// Where it was seen: features are normalized with the lens that is given.
 Eigen::Vector2d pixel(const Simulation& simulation, std::size_t camera, const Eigen::Vector2d& feature) {
   return to_pixel(simulation.calibration().cameras[camera], feature);
 }
@@ -190,21 +190,21 @@ TEST_CASE("calibration error: every quantity is drawn with its standard deviatio
 
 TEST_CASE("calibration error: 0 is the true calibration, bit for bit; the drive is that of any other") {
   const Simulation perfect(short_run(0.0));
-  const ear::Calibration& told = perfect.calibration();
+  const ear::Calibration& given = perfect.calibration();
   const ear::Calibration& truth = perfect.true_calibration();
   for (std::size_t i = 0; i < 2; ++i) {
-    CHECK(told.cameras[i].T_BC.matrix() == truth.cameras[i].T_BC.matrix());
-    CHECK(told.cameras[i].fu == truth.cameras[i].fu);
-    CHECK(told.cameras[i].cv == truth.cameras[i].cv);
-    CHECK(told.encoder->wheel_radius[i] == truth.encoder->wheel_radius[i]);
+    CHECK(given.cameras[i].T_BC.matrix() == truth.cameras[i].T_BC.matrix());
+    CHECK(given.cameras[i].fu == truth.cameras[i].fu);
+    CHECK(given.cameras[i].cv == truth.cameras[i].cv);
+    CHECK(given.encoder->wheel_radius[i] == truth.encoder->wheel_radius[i]);
   }
-  CHECK(told.encoder->T_BO.matrix() == truth.encoder->T_BO.matrix());
-  CHECK(told.encoder->track_width == truth.encoder->track_width);
+  CHECK(given.encoder->T_BO.matrix() == truth.encoder->T_BO.matrix());
+  CHECK(given.encoder->track_width == truth.encoder->track_width);
   for (std::size_t i = 0; i < 3; ++i) {
-    CHECK(told.lasers->beams[i].d_B == truth.lasers->beams[i].d_B);
-    CHECK(told.lasers->beams[i].p_BL == truth.lasers->beams[i].p_BL);
+    CHECK(given.lasers->beams[i].d_B == truth.lasers->beams[i].d_B);
+    CHECK(given.lasers->beams[i].p_BL == truth.lasers->beams[i].p_BL);
   }
-  CHECK(told.camera_time_offset == 0.0);
+  CHECK(given.camera_time_offset == 0.0);
 
   const Simulation fixed(short_run(std::nullopt));
   check_same_drive(perfect, fixed);
@@ -256,23 +256,23 @@ TEST_CASE("calibration error: below zero or not finite it is refused") {
 
 TEST_CASE("calibration error: without one, errors are of fixed sizes; the data do not depend on them") {
   const Simulation imperfect(short_run(std::nullopt));
-  const ear::Calibration& told = imperfect.calibration();
+  const ear::Calibration& given = imperfect.calibration();
   const ear::Calibration& truth = imperfect.true_calibration();
-  CHECK(std::abs(told.encoder->wheel_radius[0] / 0.075 - 1.0) == doctest::Approx(0.003).epsilon(0.06).scale(0.0));
-  CHECK(std::abs(told.encoder->wheel_radius[1] / 0.075 - 1.0) == doctest::Approx(0.003).epsilon(0.06).scale(0.0));
-  CHECK(std::abs(told.encoder->track_width / 0.40 - 1.0) == doctest::Approx(0.003).scale(0.0));
-  CHECK(angle(told.encoder->T_BO.linear(), truth.encoder->T_BO.linear()) == doctest::Approx(0.2));
+  CHECK(std::abs(given.encoder->wheel_radius[0] / 0.075 - 1.0) == doctest::Approx(0.003).epsilon(0.06).scale(0.0));
+  CHECK(std::abs(given.encoder->wheel_radius[1] / 0.075 - 1.0) == doctest::Approx(0.003).epsilon(0.06).scale(0.0));
+  CHECK(std::abs(given.encoder->track_width / 0.40 - 1.0) == doctest::Approx(0.003).scale(0.0));
+  CHECK(angle(given.encoder->T_BO.linear(), truth.encoder->T_BO.linear()) == doctest::Approx(0.2));
   for (std::size_t i = 0; i < 3; ++i) {
-    const double cosine = told.lasers->beams[i].d_B.dot(truth.lasers->beams[i].d_B);
+    const double cosine = given.lasers->beams[i].d_B.dot(truth.lasers->beams[i].d_B);
     CHECK(std::acos(cosine) / kDegree == doctest::Approx(0.2).epsilon(1e-3));
   }
-  CHECK(angle(told.cameras[0].T_BC.linear(), truth.cameras[0].T_BC.linear()) == doctest::Approx(0.2));
-  const Eigen::Isometry3d told_pair = told.cameras[0].T_BC.inverse() * told.cameras[1].T_BC;
+  CHECK(angle(given.cameras[0].T_BC.linear(), truth.cameras[0].T_BC.linear()) == doctest::Approx(0.2));
+  const Eigen::Isometry3d given_pair = given.cameras[0].T_BC.inverse() * given.cameras[1].T_BC;
   const Eigen::Isometry3d true_pair = truth.cameras[0].T_BC.inverse() * truth.cameras[1].T_BC;
-  CHECK(angle(told_pair.linear(), true_pair.linear()) == doctest::Approx(0.02).epsilon(1e-3).scale(0.0));
-  CHECK((told_pair.translation() - true_pair.translation()).norm() < 1e-12);
-  CHECK(told.cameras[0].fu == truth.cameras[0].fu);
-  CHECK(std::abs(told.camera_time_offset) == doctest::Approx(0.001).scale(0.0));
+  CHECK(angle(given_pair.linear(), true_pair.linear()) == doctest::Approx(0.02).epsilon(1e-3).scale(0.0));
+  CHECK((given_pair.translation() - true_pair.translation()).norm() < 1e-12);
+  CHECK(given.cameras[0].fu == truth.cameras[0].fu);
+  CHECK(std::abs(given.camera_time_offset) == doctest::Approx(0.001).scale(0.0));
 }
 
 }  // namespace ear::simulator

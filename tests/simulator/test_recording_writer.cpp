@@ -75,28 +75,28 @@ TEST_CASE("recording: the reader gets back calibration and samples") {
 
   ear::Recording recording(folder / "r");
   const ear::Calibration& read = recording.calibration();
-  const ear::Calibration& told = simulation.calibration();
+  const ear::Calibration& given = simulation.calibration();
   REQUIRE(read.encoder);
   REQUIRE(read.lasers);
-  CHECK((read.encoder->T_BO.matrix() - told.encoder->T_BO.matrix()).norm() < 1e-9);
-  CHECK(read.encoder->wheel_radius[0] == doctest::Approx(told.encoder->wheel_radius[0]).epsilon(1e-8));
-  CHECK(read.encoder->wheel_radius[1] == doctest::Approx(told.encoder->wheel_radius[1]).epsilon(1e-8));
-  CHECK(read.encoder->track_width == doctest::Approx(told.encoder->track_width).epsilon(1e-8));
+  CHECK((read.encoder->T_BO.matrix() - given.encoder->T_BO.matrix()).norm() < 1e-9);
+  CHECK(read.encoder->wheel_radius[0] == doctest::Approx(given.encoder->wheel_radius[0]).epsilon(1e-8));
+  CHECK(read.encoder->wheel_radius[1] == doctest::Approx(given.encoder->wheel_radius[1]).epsilon(1e-8));
+  CHECK(read.encoder->track_width == doctest::Approx(given.encoder->track_width).epsilon(1e-8));
   CHECK(read.encoder->wraps);
-  CHECK(read.imu.gyro_noise == told.imu.gyro_noise);
-  CHECK(read.imu.accel_random_walk == told.imu.accel_random_walk);
+  CHECK(read.imu.gyro_noise == given.imu.gyro_noise);
+  CHECK(read.imu.accel_random_walk == given.imu.accel_random_walk);
   for (std::size_t i = 0; i < 3; ++i) {
-    CHECK((read.lasers->beams[i].d_B - told.lasers->beams[i].d_B).norm() < 1e-9);
-    CHECK((read.lasers->beams[i].p_BL - told.lasers->beams[i].p_BL).norm() < 1e-8);
+    CHECK((read.lasers->beams[i].d_B - given.lasers->beams[i].d_B).norm() < 1e-9);
+    CHECK((read.lasers->beams[i].p_BL - given.lasers->beams[i].p_BL).norm() < 1e-8);
   }
 
   for (std::size_t i = 0; i < 2; ++i) {
-    CHECK(read.cameras[i].distortion == told.cameras[i].distortion);
-    CHECK(read.cameras[i].fu == doctest::Approx(told.cameras[i].fu).epsilon(1e-8));
-    CHECK(read.cameras[i].cu == doctest::Approx(told.cameras[i].cu).epsilon(1e-8));
-    CHECK((read.cameras[i].T_BC.matrix() - told.cameras[i].T_BC.matrix()).norm() < 1e-9);
+    CHECK(read.cameras[i].distortion == given.cameras[i].distortion);
+    CHECK(read.cameras[i].fu == doctest::Approx(given.cameras[i].fu).epsilon(1e-8));
+    CHECK(read.cameras[i].cu == doctest::Approx(given.cameras[i].cu).epsilon(1e-8));
+    CHECK((read.cameras[i].T_BC.matrix() - given.cameras[i].T_BC.matrix()).norm() < 1e-9);
   }
-  CHECK(std::abs(read.camera_time_offset - told.camera_time_offset) < 1e-8);
+  CHECK(std::abs(read.camera_time_offset - given.camera_time_offset) < 1e-8);
 
   std::size_t imu = 0;
   std::size_t encoders = 0;
@@ -190,12 +190,12 @@ TEST_CASE("recording: pictures do not depend on the threads, and serve the other
   options.calibration_error = 1.0;
   const Simulation wrong(options);
   write_recording(imperfect, folder / "imperfect");
-  std::size_t told = 0;
+  std::size_t given = 0;
   render_images(imperfect, all_pictures(imperfect), folder / "imperfect", 1, [&](std::size_t done, std::size_t total) {
-    CHECK(done == ++told);
+    CHECK(done == ++given);
     CHECK(total == 2 * imperfect.frame_times().size());
   });
-  CHECK(told == 2 * imperfect.frame_times().size());
+  CHECK(given == 2 * imperfect.frame_times().size());
   render_images(imperfect, all_pictures(imperfect), folder / "threads", 3, no_progress);
   render_images(wrong, all_pictures(wrong), folder / "wrong", 1, no_progress);
   write_recording(perfect, folder / "perfect");

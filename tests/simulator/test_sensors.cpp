@@ -143,7 +143,7 @@ TEST_CASE("encoders: wheels that spin idly turn, and the truth says how fast, bu
   const ear::EncoderCalibration& axle = *simulation.true_calibration().encoder;
   double forward = 0.0;  // travel of the rims [m]
   double backward = 0.0;
-  double told = 0.0;
+  double given = 0.0;
   for (std::size_t i = 1; i < simulation.encoders().size(); ++i) {
     const ear::EncoderSample& a = simulation.encoders()[i - 1];
     const ear::EncoderSample& b = simulation.encoders()[i];
@@ -155,11 +155,11 @@ TEST_CASE("encoders: wheels that spin idly turn, and the truth says how fast, bu
                           2.0 * kPi / static_cast<double>(axle.resolution);
     const double travel = axle.wheel_radius[0] * (turned + 0.01 * motion.omega_O.y());
     (travel > 0.0 ? forward : backward) += travel;
-    told += 0.01 * simulation.truth((a.t_ns + b.t_ns) / 2).slip;
+    given += 0.01 * simulation.truth((a.t_ns + b.t_ns) / 2).slip;
   }
   CHECK(forward > 0.6);    // 4 s at 0.275 m/s, 30 % more or less
   CHECK(backward < -0.4);  // 3 s at -0.25 m/s
-  CHECK(forward + backward == doctest::Approx(told).epsilon(0.002));
+  CHECK(forward + backward == doctest::Approx(given).epsilon(0.002));
   CHECK(simulation.truth(simulation.imu().back().t_ns).slip == 0.0);
 }
 

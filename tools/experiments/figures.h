@@ -49,7 +49,7 @@ struct EstimatorChoice {
   bool timed = false;       ///< with Figures::frame_time, which is never the same twice
 };
 
-/// Runs a new filter that is told `calibration`, its lenses too; without cameras in it, without images. A run whose
+/// Runs a new filter that is given `calibration`, its lenses too; without cameras in it, without images. A run whose
 /// estimate stops being finite keeps only its coverage. `on_health`, if given, is told what the health is after every
 /// sample and frame.
 [[nodiscard]] Figures measure(const simulator::Simulation& simulation, const Calibration& calibration,

@@ -14,7 +14,7 @@ struct Setup {
   std::string sequence;
   double camera_rate_hz = 30.0;
   std::string odometer = "none";     ///< what the filter makes of the wheels
-  bool true_calibration = true;      ///< the filter is told the true calibration, or a wrong one
+  bool true_calibration = true;      ///< the filter is given the true calibration, or a wrong one
   std::string settings = "default";  ///< name of the filter's settings
 };
 

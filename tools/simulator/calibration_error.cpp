@@ -81,24 +81,24 @@ CalibrationErrors draw_calibration_errors(std::uint64_t seed, double factor) {
   return errors;
 }
 
-Calibration with_errors(Calibration told, const CalibrationErrors& errors) {
+Calibration with_errors(Calibration given, const CalibrationErrors& errors) {
   const Eigen::Matrix3d R_stereo = rotation(errors.stereo_rotation_C0);
-  Eigen::Isometry3d T_C0C1 = told.cameras[0].T_BC.inverse() * told.cameras[1].T_BC;
+  Eigen::Isometry3d T_C0C1 = given.cameras[0].T_BC.inverse() * given.cameras[1].T_BC;
   T_C0C1.linear() = R_stereo * T_C0C1.linear();
   T_C0C1.translation() += errors.stereo_position_C0;
-  Eigen::Isometry3d& T_BC0 = told.cameras[0].T_BC;
+  Eigen::Isometry3d& T_BC0 = given.cameras[0].T_BC;
   T_BC0.linear() = rotation(errors.rig_rotation_B) * T_BC0.linear();
   T_BC0.translation() += errors.rig_position_B;
-  told.cameras[1].T_BC = T_BC0 * T_C0C1;
+  given.cameras[1].T_BC = T_BC0 * T_C0C1;
   for (std::size_t i = 0; i < errors.cameras.size(); ++i) {
-    CameraCalibration& camera = told.cameras[i];
+    CameraCalibration& camera = given.cameras[i];
     camera.fu *= 1.0 + errors.cameras[i].focal_length;
     camera.fv *= 1.0 + errors.cameras[i].focal_length;
     camera.cu += errors.cameras[i].principal_point.x();
     camera.cv += errors.cameras[i].principal_point.y();
   }
 
-  EncoderCalibration& encoder = *told.encoder;
+  EncoderCalibration& encoder = *given.encoder;
   encoder.wheel_radius[0] *= 1.0 + errors.wheel_radius + 0.5 * errors.radius_difference;
   encoder.wheel_radius[1] *= 1.0 + errors.wheel_radius - 0.5 * errors.radius_difference;
   encoder.track_width *= 1.0 + errors.track_width;
@@ -106,16 +106,16 @@ Calibration with_errors(Calibration told, const CalibrationErrors& errors) {
   encoder.T_BO.translation() += errors.odometer_position_B;
 
   for (std::size_t i = 0; i < errors.beams.size(); ++i) {
-    LaserBeam& beam = told.lasers->beams[i];
+    LaserBeam& beam = given.lasers->beams[i];
     beam.d_B = rotation(errors.beams[i].rotation_B) * beam.d_B;
     beam.p_BL += errors.beams[i].origin_B;
   }
-  told.camera_time_offset += errors.camera_time_offset;
-  return told;
+  given.camera_time_offset += errors.camera_time_offset;
+  return given;
 }
 
-Calibration with_fixed_errors(Calibration told, Rng& rng) {
-  EncoderCalibration& encoder = *told.encoder;
+Calibration with_fixed_errors(Calibration given, Rng& rng) {
+  EncoderCalibration& encoder = *given.encoder;
   const double radius_error = random_sign(rng) * kFixedScale;
   const double radius_difference = random_sign(rng) * kFixedRadiusDifference;
   encoder.wheel_radius[0] *= 1.0 + radius_error + 0.5 * radius_difference;
@@ -123,24 +123,24 @@ Calibration with_fixed_errors(Calibration told, Rng& rng) {
   encoder.track_width *= 1.0 + random_sign(rng) * kFixedScale;
   encoder.T_BO.linear() = random_rotation(rng, kFixedMounting) * encoder.T_BO.linear();
 
-  for (LaserBeam& beam : told.lasers->beams) {
+  for (LaserBeam& beam : given.lasers->beams) {
     const Eigen::Vector3d axis = beam.d_B.cross(random_direction(rng)).normalized();
     beam.d_B = Eigen::AngleAxisd(kFixedMounting, axis) * beam.d_B;
   }
 
   // The pair turns as one about the left camera.
-  const Eigen::Vector3d pivot_B = told.cameras.front().T_BC.translation();
+  const Eigen::Vector3d pivot_B = given.cameras.front().T_BC.translation();
   const Eigen::Matrix3d R_error = random_rotation(rng, kFixedMounting);
-  for (CameraCalibration& camera : told.cameras) {
+  for (CameraCalibration& camera : given.cameras) {
     const Eigen::Vector3d p_B = camera.T_BC.translation();
     camera.T_BC.linear() = R_error * camera.T_BC.linear();
     camera.T_BC.translation() = pivot_B + R_error * (p_B - pivot_B);
   }
-  Eigen::Isometry3d& T_BC1 = told.cameras.back().T_BC;
+  Eigen::Isometry3d& T_BC1 = given.cameras.back().T_BC;
   T_BC1.linear() = T_BC1.linear() * random_rotation(rng, kFixedStereo);
 
-  told.camera_time_offset += random_sign(rng) * kFixedTime;
-  return told;
+  given.camera_time_offset += random_sign(rng) * kFixedTime;
+  return given;
 }
 
 }  // namespace ear::simulator

@@ -1,4 +1,4 @@
-// How the calibration that the estimator is told differs from the true one.
+// How the calibration that the estimator is given differs from the true one.
 #pragma once
 
 #include <Eigen/Core>

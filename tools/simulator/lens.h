@@ -21,7 +21,7 @@ namespace ear::simulator {
 [[nodiscard]] std::optional<Eigen::Vector2d> project(const CameraCalibration& camera, const Eigen::Vector3d& p_C,
                                                      double margin = 0.0);
 
-/// Features that were normalized with the lenses `from`, as who is told `to` normalizes their pixels. Cameras whose
+/// Features that were normalized with the lenses `from`, as who has `to` normalizes their pixels. Cameras whose
 /// lens is the same keep their bits.
 void change_lenses(const std::vector<CameraCalibration>& from, const std::vector<CameraCalibration>& to,
                    FeatureFrame& frame);

@@ -10,7 +10,7 @@ namespace ear::simulator {
 /// With cameras there are pictures to come; without, none of their files is written, and it is a recording of the rest.
 enum class WithCameras { yes, no };
 
-/// Writes everything but the pictures: csv files, sensor.yaml files with the calibration told, truth, truth_extra.csv,
+/// Writes everything but the pictures: csv files, sensor.yaml files with the given calibration, truth, truth_extra.csv,
 /// faults.csv and simulation.yaml, which says what made it. Throws std::runtime_error, naming the file, if it cannot
 /// write or if `directory` already holds a recording.
 void write_recording(const Simulation& simulation, const std::filesystem::path& directory,

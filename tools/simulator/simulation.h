@@ -75,7 +75,7 @@ class Simulation {
   /// calibration error below zero, or a fault that cannot be.
   explicit Simulation(const Options& options);
 
-  /// What the estimator is told, as wrong as Options::calibration_error says.
+  /// What the estimator is given, as wrong as Options::calibration_error says.
   [[nodiscard]] const Calibration& calibration() const { return calibration_; }
   [[nodiscard]] const Calibration& true_calibration() const { return true_calibration_; }
 

@@ -1,4 +1,4 @@
-// The simulated vehicle's sensors: where they truly are. What the estimator is told: calibration_error.h.
+// The simulated vehicle's sensors: where they truly are. What the estimator is given: calibration_error.h.
 #pragma once
 
 #include "ear/calibration.h"

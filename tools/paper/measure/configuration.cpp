@@ -144,7 +144,7 @@ std::string settings_text(const Configuration& configuration) {
   return text;
 }
 
-Calibration told(const Configuration& configuration, Calibration calibration) {
+Calibration given(const Configuration& configuration, Calibration calibration) {
   if (!configuration.lasers) calibration.lasers.reset();
   return calibration;
 }

@@ -23,7 +23,7 @@ struct Configuration {
   std::string title;  ///< for people
   Config config;
   Estimator estimator = Estimator::filter;
-  bool lasers = true;      ///< false: the estimator is not told that there are any
+  bool lasers = true;      ///< false: the estimator is given none
   bool pitch_rate = true;  ///< false: the encoders' angles come without the body's pitch, so that (5) gives nothing
   bool beams_together = false;  ///< true: a reading of the lasers in which one has no return is left out
   bool tracks_only = false;     ///< it changes samples, which only a simulation in memory allows
@@ -43,7 +43,7 @@ struct Configuration {
 /// Everything that distinguishes its results from those of others, as text: "filter.window: 12\n" ...
 [[nodiscard]] std::string settings_text(const Configuration& configuration);
 
-/// What the estimator is told of this calibration.
-[[nodiscard]] Calibration told(const Configuration& configuration, Calibration calibration);
+/// What the estimator is given of this calibration.
+[[nodiscard]] Calibration given(const Configuration& configuration, Calibration calibration);
 
 }  // namespace ear::paper

@@ -94,7 +94,7 @@ MakeEstimator maker_of(const Configuration& configuration) {
 }  // namespace
 
 Result run_on_tracks(const simulator::Simulation& simulation, const Configuration& configuration) {
-  const Calibration calibration = told(configuration, simulation.calibration());
+  const Calibration calibration = given(configuration, simulation.calibration());
   const FilterConfig& config = configuration.config.filter;
   const std::unique_ptr<ear::Estimator> estimator = maker_of(configuration)(config, calibration);
   Record record;
@@ -123,7 +123,7 @@ Result run_on_images(const std::filesystem::path& recording, double camera_rate_
   options.camera_rate_hz = camera_rate_hz;
   Recording samples(recording, options);
   Odometry odometry =
-      OdometryFactory::make(configuration.config, told(configuration, samples.calibration()), maker_of(configuration));
+      OdometryFactory::make(configuration.config, given(configuration, samples.calibration()), maker_of(configuration));
   Record record;
   double begin = 0.0;
   const auto before_sample = [&](const Sample&) {

@@ -9,7 +9,7 @@
 
 namespace ear::paper {
 
-/// On a simulation's feature tracks, in memory. The estimator is told Simulation::calibration().
+/// On a simulation's feature tracks, in memory. The estimator is given Simulation::calibration().
 [[nodiscard]] Result run_on_tracks(const simulator::Simulation& simulation, const Configuration& configuration);
 
 /// On a recording with images, at its camera's rate or a lower one [Hz].
