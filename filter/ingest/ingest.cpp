@@ -33,7 +33,6 @@ Ingest::Ingest(const FilterConfig& config, const Calibration& calibration)
       calibration_(calibration),
       guard_(calibration, config.max_imu_gap),
       impact_guard_(config.impact, calibration.imu),
-      between_samples_(calibration.imu),
       spikes_(config.impact, calibration.imu),
       imu_(kImuCapacity),
       increments_(kReadingCapacity),
@@ -61,9 +60,7 @@ ImuVerdict Ingest::judge(const ImuSample& sample) {
 
 ImuFault Ingest::store(const ImuSample& sample) {
   const double dt = imu_.empty() ? INFINITY : seconds_between(imu_.newest().t_ns, sample.t_ns);
-  const ImuNoiseFactors impact = impact_guard_.add(sample), between = between_samples_.add(sample);
-  const auto both = [](double a, double b) { return std::sqrt(a * a + b * b - 1.0); };
-  imu_.push(sample, {both(impact.gyro, between.gyro), both(impact.accel, between.accel)});
+  imu_.push(sample, impact_guard_.add(sample));
   ImuFault spike;
   if (dt <= config_.max_imu_gap) {
     spike = spikes_.add(imu_, dt, impact_guard_.accel_clips());

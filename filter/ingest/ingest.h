@@ -9,7 +9,6 @@
 #include "ear/filter_config.h"
 #include "ear/types.h"
 #include "filter/ingest/beam_ranges.h"
-#include "filter/ingest/between_samples.h"
 #include "filter/ingest/impact_guard.h"
 #include "filter/ingest/imu_buffer.h"
 #include "filter/ingest/imu_clock.h"
@@ -92,7 +91,6 @@ class Ingest {
   StreamClock encoder_clock_, camera_clock_;
   InputGuard guard_;
   ImpactGuard impact_guard_;
-  BetweenSamples between_samples_;
   ImuSpikes spikes_;
   ImuBuffer imu_;
   ImuInterruption interruption_;
