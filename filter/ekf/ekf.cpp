@@ -38,13 +38,11 @@ void Ekf::start(const ImuState& x, const Eigen::VectorXd& sigma, bool scale_is_g
 }
 
 /// Calibration by a target shows how far away things are, the product of focal length and baseline, better than either:
-/// by as much as the mean focal length is too large, the baseline is too short. Not where it is stated how well the
-/// baseline is known, by whatever means.
+/// by as much as the mean focal length is too large, the baseline is too short.
 void Ekf::correlate_baseline_and_lenses(const Eigen::VectorXd& sigma) {
   constexpr int kFirst = err::stereo + 3;
   constexpr int kCount = err::lens(1) + 1 - kFirst;
-  const bool stated = calibration_.cameras.size() > 1 && calibration_.cameras[1].pose_sigma;
-  if (stated || !(sigma(kFirst) > 0.0)) return;
+  if (!(sigma(kFirst) > 0.0)) return;
   const Eigen::Vector3d shorter = -0.5 * state_.camera.T_C0C1.p;  // per relative error of one focal length
   Eigen::Matrix<double, kCount, kCount> added = Eigen::Matrix<double, kCount, kCount>::Zero();
   for (int camera = 0; camera < 2; ++camera) {
