@@ -26,11 +26,14 @@ struct PatchPlace {
   std::array<float, 2> perspective;
 };
 
+constexpr float kPatchUnit = 1.0F / 16.0F;    // [grey values] of a patch's pixels
+constexpr float kGradientUnit = 1.0F / 8.0F;  // [grey values / px]
+
 /// A patch, row by row. Offsets of its pixels from the centre are -7.5, -6.5, ... 7.5.
 struct PatchPixels {
-  alignas(32) std::array<float, kPatchPixels> value;  ///< mean removed
-  alignas(32) std::array<float, kPatchPixels> gradient_x, gradient_y;
-  float mean;
+  alignas(32) std::array<std::int16_t, kPatchPixels> value;                   ///< mean removed, in kPatchUnit
+  alignas(32) std::array<std::int16_t, kPatchPixels> gradient_x, gradient_y;  ///< in kGradientUnit
+  float mean;                                                                 ///< [grey values]
 };
 
 /// Sums over a patch of the image under it (less the patch's mean), and of its products with the patch and its

@@ -68,10 +68,11 @@ std::array<double, 9> expected_sums(const GreyLevel& level, const PatchPlace& pl
       const double y = place.centre[1] + (place.column_x[1] * ox + place.column_y[1] * oy) * scale;
       const double pixel = interpolated(level, x, y) - patch.mean;
       const auto at = static_cast<std::size_t>(row * kPatchSize + column);
-      const double gx = patch.gradient_x[at] * pixel;
-      const double gy = patch.gradient_y[at] * pixel;
-      const std::array<double, 9> terms{pixel,   pixel * pixel, patch.value[at] * pixel, gx, gy, gx * ox, gx * oy,
-                                        gy * ox, gy * oy};
+      const double value = kPatchUnit * patch.value[at];
+      const double gx = kGradientUnit * patch.gradient_x[at] * pixel;
+      const double gy = kGradientUnit * patch.gradient_y[at] * pixel;
+      const std::array<double, 9> terms{pixel,   pixel * pixel, value * pixel, gx,     gy,
+                                        gx * ox, gx * oy,       gy * ox,       gy * oy};
       for (std::size_t i = 0; i < terms.size(); ++i) sums[i] += terms[i];
     }
   }
@@ -178,8 +179,9 @@ TEST_CASE("kernels: the sums are those of the image between its pixels") {
     const std::array<float, 9> found{sums.image, sums.image2, sums.product, sums.x,  sums.y,
                                      sums.x_x,   sums.x_y,    sums.y_x,     sums.y_y};
     const std::array<double, 9> expected = expected_sums(level, place, patch);
-    // 2^-14 px of rounding times the steepest slopes of the image, in each of 256 pixels.
-    const std::array<double, 9> terms{1.0, 500.0, 250.0, 100.0, 100.0, 750.0, 750.0, 750.0, 750.0};
+    // In each of 256 pixels, a sixteenth of a grey value of rounding and 2^-12 px times the steepest slopes of the
+    // image; of the sum of the pixels only what all have in common is left.
+    const std::array<double, 9> terms{3.0, 500.0, 250.0, 100.0, 100.0, 750.0, 750.0, 750.0, 750.0};
     for (std::size_t i = 0; i < found.size(); ++i) {
       CAPTURE(i);
       CHECK(std::abs(found[i] - expected[i]) < 256 * 0.005 * terms[i]);
