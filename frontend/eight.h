@@ -27,7 +27,12 @@ using Ints = int __attribute__((vector_size(32)));
 inline Floats to_floats(Ints a) { return __builtin_convertvector(a, Floats); }
 inline Ints to_ints(Floats a) { return __builtin_convertvector(a, Ints); }  // towards 0
 
-inline float sum(Floats a) { return ((a[0] + a[4]) + (a[2] + a[6])) + ((a[1] + a[5]) + (a[3] + a[7])); }
+inline float sum(Floats a) {  // of both halves, then of both halves of that
+  const auto all = reinterpret_cast<__m256>(a);
+  const __m128 four = _mm_add_ps(_mm256_castps256_ps128(all), _mm256_extractf128_ps(all, 1));
+  const __m128 two = _mm_add_ps(four, _mm_movehl_ps(four, four));
+  return two[0] + two[1];
+}
 
 /// Products of the lower and of the upper 16 bits, added.
 inline Ints add_products(Ints a, Ints b) {
@@ -86,7 +91,13 @@ inline Ints to_ints(const Floats& a) {
 
 inline float sum(const Floats& a) {
   const Floats4 s = a.low + a.high;
+#if defined(__SSE2__)
+  const auto four = reinterpret_cast<__m128>(s);
+  const __m128 two = _mm_add_ps(four, _mm_movehl_ps(four, four));
+  return two[0] + two[1];
+#else
   return (s[0] + s[2]) + (s[1] + s[3]);
+#endif
 }
 
 inline Ints4 add_products(Ints4 a, Ints4 b) {

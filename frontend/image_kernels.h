@@ -68,12 +68,15 @@ struct ImageKernels {
   void (*align_affine)(const GreyLevel& level, const PatchPlace& place, const PatchPixels& patch, AlignmentSums& sums);
   /// image, image2 and product over the middle eight rows.
   void (*compare)(const GreyLevel& level, const PatchPlace& place, const PatchPixels& patch, AlignmentSums& sums);
+  /// What compare() gives at sixteen places: the patch's centre there, and one column of it further each time.
+  void (*compare_along)(const GreyLevel& level, const PatchPlace& place, const PatchPixels& patch,
+                        std::array<AlignmentSums, kPatchSize>& sums);
   /// Takes the upright patch around `centre`; reads two more pixels on each side.
   void (*capture)(const GreyLevel& level, const std::array<float, 2>& centre, PatchPixels& patch);
   void (*moments)(const PatchPixels& patch, PatchMoments& moments);
-  /// FAST's score of `width` pixels of a row, 0 where there is none; three pixels around are read, and up to 31 more
-  /// than `width` are looked at and written.
-  void (*corner_scores)(const std::uint8_t* row, std::ptrdiff_t stride, int width, std::uint8_t* scores);
+  /// FAST's score of `width` pixels of a row, 0 where there is none, and perhaps where it is below `threshold`; three
+  /// pixels around are read, and up to 31 more than `width` are looked at and written.
+  void (*corner_scores)(const std::uint8_t* row, std::ptrdiff_t stride, int width, int threshold, std::uint8_t* scores);
   /// One row of an image half as large: `width` pixels, each 1/256 (1 4 6 4 1) (1 4 6 4 1)^T around every second pixel
   /// of the middle one of five rows, rounded; the first is around column 0. Columns from -2 to 2 width + 1 are read, up
   /// to seven more pixels than `width` are written. `sums`: room for 2 width + 32 numbers.

@@ -14,6 +14,7 @@ ImageKernels kernels_baseline() {
           baseline::align_position,
           baseline::align_affine,
           baseline::compare,
+          baseline::compare_along,
           baseline::capture,
           baseline::moments,
           baseline::corner_scores,

@@ -338,6 +338,45 @@ void compare(const GreyLevel& level, const PatchPlace& place, const PatchPixels&
   photometry.put(sums);
 }
 
+// What compare() gives at places one column of the patch apart, from pixels that are taken once. The row's lower half
+// of the next columns follows the upper half of these.
+void compare_along(const GreyLevel& level, const PatchPlace& place, const PatchPixels& patch,
+                   std::array<AlignmentSums, kPatchSize>& sums) {
+  constexpr int kRows = kSize - 2 * kSkip;
+  constexpr float kColumns = static_cast<float>(kSize);
+  const PatchPlace further{
+      {place.centre[0] + kColumns * place.column_x[0], place.centre[1] + kColumns * place.column_x[1]},
+      place.column_x,
+      place.column_y,
+      place.perspective};
+  const Walk first(level, place, kSkip, kRows);
+  const Walk second(level, further, kSkip, kRows);
+  const Words mean = level_of(patch);
+  alignas(32) std::int16_t strip[kRows][2 * kSize];
+  alignas(32) std::int16_t total[2 * kSize];  // of the columns, 32640 at most
+  Words total_first = spread(0), total_second = spread(0);
+  for (int row = 0; row < kRows; ++row) {
+    const Words pixels = less(first.take(row), mean);
+    const Words next = less(second.take(row), mean);
+    store(strip[row], pixels);
+    store(strip[row] + kSize, next);
+    total_first = total_first + pixels;
+    total_second = total_second + next;
+  }
+  store(total, total_first);
+  store(total + kSize, total_second);
+  for (int at = 0; at < kSize; ++at) {
+    Photometry photometry;
+    photometry.image = dot(load<Words>(total + at), spread(1));
+    for (int row = 0; row < kRows; ++row) {
+      const auto pixels = load<Words>(strip[row] + at);
+      photometry.image2 += dot(pixels, pixels);
+      photometry.product += dot(pixels, load<Words>(patch.value.data() + (kSkip + row) * kSize));
+    }
+    photometry.put(sums[static_cast<std::size_t>(at)]);
+  }
+}
+
 // First derivative. Five taps: with three, fine texture looks flatter than it is, and every step overshoots.
 inline Floats derivative(const Floats& before2, const Floats& before, const Floats& after, const Floats& after2) {
   return ((after - before) * 8.0F - (after2 - before2)) * (1.0F / 12.0F);
@@ -505,12 +544,35 @@ inline void add_arcs(const Block (&circle)[16], Block& best) {
   }
 }
 
-void corner_scores(const std::uint8_t* row, std::ptrdiff_t stride, int width, std::uint8_t* scores) {
+// What no score of these pixels exceeds: an arc of nine holds two neighbours of the four pixels straight above, below,
+// left and right.
+inline std::uint8_t most_of(const std::uint8_t* centre, std::ptrdiff_t stride) {
+  Block most;
+  for (int i = 0; i < kBlock; ++i) {
+    const std::uint8_t* const p = centre + i;
+    const std::uint8_t upright_high = greater(p[-3 * stride], p[3 * stride]);
+    const std::uint8_t upright_low = lesser(p[-3 * stride], p[3 * stride]);
+    const std::uint8_t level_high = greater(p[-3], p[3]);
+    const std::uint8_t level_low = lesser(p[-3], p[3]);
+    const std::uint8_t high = greater(lesser(upright_high, level_high), p[0]);
+    const std::uint8_t low = lesser(greater(upright_low, level_low), p[0]);
+    most[i] = greater(static_cast<std::uint8_t>(high - p[0]), static_cast<std::uint8_t>(p[0] - low));
+  }
+  std::uint8_t largest = 0;
+  for (int i = 0; i < kBlock; ++i) largest = greater(largest, most[i]);
+  return largest;
+}
+
+void corner_scores(const std::uint8_t* row, std::ptrdiff_t stride, int width, int threshold, std::uint8_t* scores) {
   constexpr int kAcross[16] = {0, 1, 2, 3, 3, 3, 2, 1, 0, -1, -2, -3, -3, -3, -2, -1};
   constexpr int kDown[16] = {3, 3, 2, 1, 0, -1, -2, -3, -3, -3, -2, -1, 0, 1, 2, 3};
   for (int from = 0; from < width; from += kBlock) {
     alignas(32) Block brighter[16], darker[16], best = {};
     const std::uint8_t* const centre = row + from;
+    if (most_of(centre, stride) <= threshold) {
+      std::memset(scores + from, 0, kBlock);
+      continue;
+    }
     for (int k = 0; k < 16; ++k) {
       const std::uint8_t* const p = centre + kDown[k] * stride + kAcross[k];
       for (int i = 0; i < kBlock; ++i) {
