@@ -57,8 +57,8 @@ struct PatchMoments {
   float middle, middle2;               ///< sums of value and value^2 over the middle eight rows
 };
 
-/// Whoever calls has checked that the patch lies inside of the level with its border, and that a row more on either
-/// side, and kReadBehind bytes behind that, may be read.
+/// Whoever calls has checked that the patch lies inside of the level with its border, and that a row more above, two
+/// below, and kReadBehind bytes behind them may be read.
 constexpr int kReadBehind = 32;
 
 struct ImageKernels {

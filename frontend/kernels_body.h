@@ -55,8 +55,9 @@ inline Words interpolate(const Corners& corners, const Words& across, const Word
 
 #if EAR_HAS_PICK
 
-// Pixels that are within 15 columns and two rows from those at `p`, one for either half.
-inline Corners fetch_near(const std::uint8_t* const (&p)[2], std::ptrdiff_t stride, const Words& x, const Words& y) {
+// Pixels that are within 15 columns and two rows from those at `p`, one for either half; three rows where it is steep.
+inline Corners fetch_near(const std::uint8_t* const (&p)[2], std::ptrdiff_t stride, const Words& x, const Words& y,
+                          bool steep) {
   const Words left = (x >> kNearBits) | word(0x8000 - 0x10000);
   const Words right = left + word(1);
   const Words lower = (y << (15 - kNearBits)) >> 15;  // where the first row is above
@@ -65,8 +66,18 @@ inline Corners fetch_near(const std::uint8_t* const (&p)[2], std::ptrdiff_t stri
   const Words third = bytes_at(p[0] + 2 * stride, p[1] + 2 * stride);
   const Words left_second = pick(second, left);
   const Words right_second = pick(second, right);
-  return {choose(pick(first, left), left_second, lower), choose(pick(first, right), right_second, lower),
-          choose(left_second, pick(third, left), lower), choose(right_second, pick(third, right), lower)};
+  const Words left_third = pick(third, left);
+  const Words right_third = pick(third, right);
+  Corners corners{choose(pick(first, left), left_second, lower), choose(pick(first, right), right_second, lower),
+                  choose(left_second, left_third, lower), choose(right_second, right_third, lower)};
+  if (steep) {
+    const Words fourth = bytes_at(p[0] + 3 * stride, p[1] + 3 * stride);
+    const Words lowest = (y << (14 - kNearBits)) >> 15;  // where two rows are above
+    corners = {choose(corners.left, left_third, lowest), choose(corners.right, right_third, lowest),
+               choose(corners.left_below, pick(fourth, left), lowest),
+               choose(corners.right_below, pick(fourth, right), lowest)};
+  }
+  return corners;
 }
 
 #else
@@ -110,9 +121,13 @@ inline HalfCorners fetch_near(const std::uint8_t* p, std::ptrdiff_t stride, cons
           choose(at_left[1], at_left[2], lower), choose(at_right[1], at_right[2], lower)};
 }
 
-inline Corners fetch_near(const std::uint8_t* const (&p)[2], std::ptrdiff_t stride, const Words& x, const Words& y) {
-  const HalfCorners low = fetch_near(p[0], stride, x.low, y.low);
-  const HalfCorners high = fetch_near(p[1], stride, x.high, y.high);
+inline Corners fetch_near(const std::uint8_t* const (&p)[2], std::ptrdiff_t stride, const Words& x, const Words& y,
+                          bool steep) {
+  const auto fetch = [&](const std::uint8_t* q, const Eight16& half_x, const Eight16& half_y) {
+    return steep ? fetch_each(q, stride, half_x, half_y) : fetch_near(q, stride, half_x, half_y);
+  };
+  const HalfCorners low = fetch(p[0], x.low, y.low);
+  const HalfCorners high = fetch(p[1], x.high, y.high);
   return {{low.left, high.left},
           {low.right, high.right},
           {low.left_below, high.left_below},
@@ -163,8 +178,9 @@ class Walk {
     // Eight pixels lie near each other unless the warp turns or stretches a lot. The highest is the first or the last
     // of them, or above these by no more than the row bends, and than rounding.
     const float margin = 13.0F * size(lx * place.column_x[1]) + 0.01F;
-    near_ = steps[0] - changes[0] > 0.0F && 7.0F * (steps[0] + changes[0]) < 14.0F &&
-            7.0F * (size(steps[1]) + changes[1]) + margin < 0.99F;
+    const float rise = 7.0F * (size(steps[1]) + changes[1]) + margin;
+    near_ = steps[0] - changes[0] > 0.0F && 7.0F * (steps[0] + changes[0]) < 14.0F && rise < 1.99F;
+    steep_ = rise > 0.99F;
     if (near_) prepare(rows, to_fixed(margin));
   }
 
@@ -221,7 +237,7 @@ class Walk {
     const Words y = along(1);
     const std::uint8_t* const p[2] = {origin_ + offset_[0][row], origin_ + offset_[1][row]};
     const auto weight = [](const Words& at) { return (at & word(kNearOne - 1)) << (15 - kNearBits); };
-    return interpolate(fetch_near(p, stride_, x, y), weight(x), weight(y));
+    return interpolate(fetch_near(p, stride_, x, y, steep_), weight(x), weight(y));
   }
 
   [[nodiscard]] Words take_each(int row) const {
@@ -245,6 +261,7 @@ class Walk {
   std::ptrdiff_t stride_;
   const std::uint8_t* origin_;
   bool near_;
+  bool steep_;
   int bend_[2];                              // half the change of the step from column to column
   alignas(32) int begin_[2][kSize];          // by x and y, for each row: its first pixel,
   alignas(32) int step_[2][kSize];           // and the way to the next

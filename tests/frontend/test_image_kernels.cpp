@@ -122,7 +122,7 @@ TEST_CASE("kernels: all variants of this processor give the same bits") {
 
 // Only exact arithmetic, and random numbers that are the same in every standard library.
 TEST_CASE("kernels: the bits are the same on every kind of processor") {
-  constexpr std::uint64_t kEverywhere = 0x50ad237b7de214a0;  // x86-64 and 64-bit Arm, g++ 12 and clang 14
+  constexpr std::uint64_t kEverywhere = 0xaa470d83df62f3eb;  // x86-64 and 64-bit Arm, g++ 12 and clang 14
   for (const ImageKernels& kernels : image_kernels()) {
     CAPTURE(name_of(kernels.kind));
     std::mt19937 random(5);
