@@ -12,7 +12,7 @@ namespace {
 constexpr int kSearchLevel = StereoMatcher::kLevels - 1;
 constexpr int kRefineLevel = 1;
 constexpr double kSearchStepPx = 4.0;          // on the base image: one pixel of the search level
-constexpr double kMaxOffLinePx = 2.0;          // at the end of 16 steps that follow the patch's rows
+constexpr double kMaxOffLinePx = 3.0;          // of sixteen steps along a row of the patch, from first to last
 constexpr double kMaxDisparityShare = 0.2;     // of the image's width
 constexpr float kMinSearchCorrelation = 0.5F;  // on the search level
 constexpr float kRivalMargin = 0.1F;           // a second peak this close to the first is looked at as well
@@ -131,16 +131,20 @@ std::optional<StereoMatch> StereoMatcher::follow(const ImagePyramid& right, cons
 std::optional<StereoMatcher::Columns> StereoMatcher::columns_from(const Eigen::Vector2d& left, double inverse_depth,
                                                                   const Warp& warp, const Eigen::Vector2d& aside,
                                                                   int level) const {
-  const double size = static_cast<double>(1 << level);
-  const double step = size * inverse_depth_per_pixel_ * static_cast<double>(warp.affine.col(0).norm());
+  Eigen::Vector2d column = static_cast<double>(1 << level) * warp.affine.col(0).cast<double>();
+  const double length = kPatchSize * column.norm();
   const auto first = project(left, inverse_depth);
-  const auto last = project(left, inverse_depth + kPatchSize * step);
-  if (!first || !last) return std::nullopt;
-  Eigen::Vector2d column = size * warp.affine.col(0).cast<double>();
+  const auto ahead = project(left, inverse_depth + length * inverse_depth_per_pixel_);
+  if (!first || !ahead || *ahead == *first) return std::nullopt;
+  const double step = length * inverse_depth_per_pixel_ * length / ((*ahead - *first).norm() * kPatchSize);
+  const auto last = project(left, inverse_depth + kPatchSize * step);  // the lens compresses what is far off its axis
+  if (!last) return std::nullopt;
   const bool backwards = column.dot(*last - *first) < 0.0;
   if (backwards) column = -column;
   const Eigen::Vector2d off = *last - (*first + kPatchSize * column);
-  if (off.norm() > kMaxOffLinePx) return std::nullopt;
+  const double along = off.dot(column) / column.norm();
+  const double across2 = off.squaredNorm() - along * along;
+  if (std::abs(along) > kSearchStepPx || across2 > kMaxOffLinePx * kMaxOffLinePx) return std::nullopt;
   return Columns{*first + 0.5 * off + aside, column, step, backwards};
 }
 
