@@ -74,13 +74,15 @@ struct ImageKernels {
   /// Takes the upright patch around `centre`; reads two more pixels on each side.
   void (*capture)(const GreyLevel& level, const std::array<float, 2>& centre, PatchPixels& patch);
   void (*moments)(const PatchPixels& patch, PatchMoments& moments);
+  /// Without those that have an offset: the first of each.
+  void (*position_moments)(const PatchPixels& patch, PatchMoments& moments);
   /// FAST's score of `width` pixels of a row, 0 where there is none, and perhaps where it is below `threshold`; three
   /// pixels around are read, and up to 31 more than `width` are looked at and written.
   void (*corner_scores)(const std::uint8_t* row, std::ptrdiff_t stride, int width, int threshold, std::uint8_t* scores);
   /// One row of an image half as large: `width` pixels, each 1/256 (1 4 6 4 1) (1 4 6 4 1)^T around every second pixel
-  /// of the middle one of five rows, rounded; the first is around column 0. Columns from -2 to 2 width + 1 are read, up
-  /// to seven more pixels than `width` are written. `sums`: room for 2 width + 32 numbers.
-  void (*halve_row)(const std::array<const std::uint8_t*, 5>& rows, int width, std::uint16_t* sums, std::uint8_t* out);
+  /// of the middle one of five rows, rounded; the first is around column 0. Columns from -2 to 2 width + 1 and up
+  /// to 30 more are read, up to 15 more pixels than `width` are written. `sums`: room for 2 width + 64 numbers.
+  void (*halve_row)(const std::array<const std::uint8_t*, 5>& rows, int width, std::int16_t* sums, std::uint8_t* out);
 };
 
 /// Those that this build has and this processor can run, the best one last.

@@ -17,6 +17,7 @@ ImageKernels kernels_baseline() {
           baseline::compare_along,
           baseline::capture,
           baseline::moments,
+          baseline::position_moments,
           baseline::corner_scores,
           baseline::halve_row};
 }

@@ -44,12 +44,14 @@ struct Corners {
   Words left, right, left_below, right_below;
 };
 
+// Of pixels, with kBetweenBits.
+inline Words between(const Words& left, const Words& right, const Words& across) {
+  return (left << kBetweenBits) + multiply_high((right - left) << (kBetweenBits + 1), across);
+}
+
 inline Words interpolate(const Corners& corners, const Words& across, const Words& down) {
-  const auto row = [&](const Words& left, const Words& right) {
-    return (left << kBetweenBits) + multiply_high((right - left) << (kBetweenBits + 1), across);
-  };
-  const Words above = row(corners.left, corners.right);
-  const Words below = row(corners.left_below, corners.right_below);
+  const Words above = between(corners.left, corners.right, across);
+  const Words below = between(corners.left_below, corners.right_below, across);
   return above + multiply_high((below - above) << 1, down);
 }
 
@@ -394,56 +396,47 @@ void compare_along(const GreyLevel& level, const PatchPlace& place, const PatchP
   }
 }
 
-// First derivative. Five taps: with three, fine texture looks flatter than it is, and every step overshoots.
-inline Floats derivative(const Floats& before2, const Floats& before, const Floats& after, const Floats& after2) {
-  return ((after - before) * 8.0F - (after2 - before2)) * (1.0F / 12.0F);
-}
-
-// To the next whole number of units.
-inline void put(const Floats& numbers, float unit, std::int16_t* out) {
-  constexpr int kPositive = 1 << 14;
-  store_words(out, to_ints(numbers * (1.0F / unit) + (static_cast<float>(kPositive) + 0.5F)) - kPositive);
+// First derivative of what has kBetweenBits, in kGradientUnit. Five taps: with three, fine texture looks flatter than
+// it is, and every step overshoots.
+inline Words derivative(const Words& before2, const Words& before, const Words& after, const Words& after2) {
+  static_assert(kBetweenBits == 6 && 8.0F * kGradientUnit == 1.0F, "(8 (after - before) - (after2 - before2)) / 96");
+  return multiply_high((after - before) - ((after2 - before2) >> 3) + word(6), spread(word((1 << 16) / 12)));
 }
 
 void capture(const GreyLevel& level, const std::array<float, 2>& centre, PatchPixels& patch) {
   constexpr int kReach = 2;  // of the derivative
   constexpr int kWide = kSize + 2 * kReach;
-  constexpr int kRow = 24;  // kWide, in eights
-  alignas(32) float wide[kWide * kRow];
+  constexpr int kRow = 2 * kSize;  // kWide, in sixteens
+  alignas(32) std::int16_t wide[kWide][kRow];
   const int x = to_fixed(centre[0] - kPatchHalf - static_cast<float>(kReach) + static_cast<float>(kOffset));
   const int y = to_fixed(centre[1] - kPatchHalf - static_cast<float>(kReach) + static_cast<float>(kOffset));
   const std::uint8_t* corner =
       level.origin + ((y >> kFixedBits) - kOffset) * level.stride + ((x >> kFixedBits) - kOffset);
-  const float weight_x = static_cast<float>(x & (kFixedOne - 1)) * (1.0F / static_cast<float>(kFixedOne));
-  const float weight_y = static_cast<float>(y & (kFixedOne - 1)) * (1.0F / static_cast<float>(kFixedOne));
-  for (int row = 0; row < kWide; ++row, corner += level.stride) {
-    float* const out = wide + row * kRow;
-    const std::uint8_t* const below = corner + level.stride;
-    for (int i = 0; i < kRow; ++i) {  // in eights; the last four are not looked at
-      const auto top = static_cast<float>(corner[i]);
-      const auto bottom = static_cast<float>(below[i]);
-      const float left = top + weight_x * (static_cast<float>(corner[i + 1]) - top);
-      const float right = bottom + weight_x * (static_cast<float>(below[i + 1]) - bottom);
-      out[i] = left + weight_y * (right - left);
+  const Words across = spread(word((x & (kFixedOne - 1)) >> 1));
+  const Words down = spread(word((y & (kFixedOne - 1)) >> 1));
+  for (int from = 0; from < kRow; from += kSize) {
+    Words above = between(words_at(corner + from), words_at(corner + from + 1), across);
+    for (int row = 0; row < kWide; ++row) {
+      const std::uint8_t* const next = corner + (row + 1) * level.stride + from;
+      const Words below = between(words_at(next), words_at(next + 1), across);
+      store(wide[row] + from, above + multiply_high((below - above) << 1, down));
+      above = below;
     }
   }
-  Floats total{};
+  Ints total{};
   for (int row = 0; row < kSize; ++row) {
-    const float* const in = wide + (row + kReach) * kRow + kReach;
-    total += load<Floats>(in) + load<Floats>(in + 8);
+    total += dot(load<Words>(wide[row + kReach] + kReach), spread(1));
   }
-  patch.mean = sum(total) * (1.0F / static_cast<float>(kPatchPixels));
+  constexpr float kOne = static_cast<float>(1 << kBetweenBits);
+  const float mean = sum(to_floats(total)) * (1.0F / static_cast<float>(kPatchPixels));
+  patch.mean = mean * (1.0F / kOne);
+  const Words less_mean = spread(word(static_cast<int>(mean + 0.5F) - 2));  // to the next, when two bits are cut off
   for (int row = 0; row < kSize; ++row) {
-    for (int group = 0; group < kGroups; ++group) {
-      const float* const in = wide + (row + kReach) * kRow + kReach + 8 * group;
-      const int at = row * kSize + 8 * group;
-      put(load<Floats>(in) - patch.mean, kPatchUnit, patch.value.data() + at);
-      put(derivative(load<Floats>(in - 2), load<Floats>(in - 1), load<Floats>(in + 1), load<Floats>(in + 2)),
-          kGradientUnit, patch.gradient_x.data() + at);
-      put(derivative(load<Floats>(in - 2 * kRow), load<Floats>(in - kRow), load<Floats>(in + kRow),
-                     load<Floats>(in + 2 * kRow)),
-          kGradientUnit, patch.gradient_y.data() + at);
-    }
+    const std::int16_t* const in = wide[row + kReach] + kReach;
+    const auto at = [&](int further) { return load<Words>(in + further); };
+    store(patch.value.data() + row * kSize, less(at(0), less_mean));
+    store(patch.gradient_x.data() + row * kSize, derivative(at(-2), at(-1), at(1), at(2)));
+    store(patch.gradient_y.data() + row * kSize, derivative(at(-2 * kRow), at(-kRow), at(kRow), at(2 * kRow)));
   }
 }
 
@@ -521,23 +514,56 @@ void moments(const PatchPixels& patch, PatchMoments& out) {
   out.middle2 = sum(middle2) * (kPatchUnit * kPatchUnit);
 }
 
-void halve_row(const std::array<const std::uint8_t*, 5>& rows, int width, std::uint16_t* sums, std::uint8_t* out) {
-  constexpr int kReach = 2;
-  const std::uint8_t* const a = rows[0] - kReach;
-  const std::uint8_t* const b = rows[1] - kReach;
-  const std::uint8_t* const c = rows[2] - kReach;
-  const std::uint8_t* const d = rows[3] - kReach;
-  const std::uint8_t* const e = rows[4] - kReach;
-  const int columns = 2 * width + 2 * kReach;
-  for (int i = 0; i < columns; ++i) {
-    sums[i] = static_cast<std::uint16_t>(a[i] + e[i] + 4 * (b[i] + d[i]) + 6 * c[i]);
+void position_moments(const PatchPixels& patch, PatchMoments& out) {
+  Ints gx_gx{}, gx_gy{}, gy_gy{}, gx{}, gy{}, gx_value{}, gy_value{}, energy{}, middle{}, middle2{};
+  for (int row = 0; row < kSize; ++row) {
+    const auto x = load<Words>(patch.gradient_x.data() + row * kSize);
+    const auto y = load<Words>(patch.gradient_y.data() + row * kSize);
+    const auto value = load<Words>(patch.value.data() + row * kSize);
+    const Ints value2 = dot(value, value);
+    gx_gx += dot(x, x);
+    gx_gy += dot(x, y);
+    gy_gy += dot(y, y);
+    gx += dot(x, spread(1));
+    gy += dot(y, spread(1));
+    gx_value += dot(x, value);
+    gy_value += dot(y, value);
+    energy += value2;
+    if (row < kSkip || row >= kSize - kSkip) continue;
+    middle += dot(value, spread(1));
+    middle2 += value2;
   }
-  for (int i = columns; i < columns + 16; ++i) sums[i] = 0;  // of pixels that nobody looks at
-  for (int i = 0; i < width; i += 8) {                       // in pairs of neighbours
-    const Ints first = add_products(load<Ints>(sums + 2 * i), all(1 | (4 << 16)));
-    const Ints second = add_products(load<Ints>(sums + 2 * i + 2), all(6 | (4 << 16)));
-    const Ints third = add_products(load<Ints>(sums + 2 * i + 4), all(1));
-    store_bytes(out + i, (first + second + third + 128) >> 8);
+  out.gx_gx.one = grey(gx_gx, kGradientUnit * kGradientUnit);
+  out.gx_gy.one = grey(gx_gy, kGradientUnit * kGradientUnit);
+  out.gy_gy.one = grey(gy_gy, kGradientUnit * kGradientUnit);
+  out.gx.one = grey(gx, kGradientUnit);
+  out.gy.one = grey(gy, kGradientUnit);
+  out.gx_value.one = grey(gx_value, kGradientProduct);
+  out.gy_value.one = grey(gy_value, kGradientProduct);
+  out.energy = grey(energy, kPatchUnit * kPatchUnit);
+  out.middle = grey(middle, kPatchUnit);
+  out.middle2 = grey(middle2, kPatchUnit * kPatchUnit);
+}
+
+void halve_row(const std::array<const std::uint8_t*, 5>& rows, int width, std::int16_t* sums, std::uint8_t* out) {
+  constexpr int kReach = 2;
+  // Factors of neighbours.
+  alignas(32) constexpr std::int16_t kFirst[16] = {1, 4, 1, 4, 1, 4, 1, 4, 1, 4, 1, 4, 1, 4, 1, 4};
+  alignas(32) constexpr std::int16_t kSecond[16] = {6, 4, 6, 4, 6, 4, 6, 4, 6, 4, 6, 4, 6, 4, 6, 4};
+  alignas(32) constexpr std::int16_t kThird[16] = {1, 0, 1, 0, 1, 0, 1, 0, 1, 0, 1, 0, 1, 0, 1, 0};
+  const auto pairs = [](const std::int16_t* p, const std::int16_t* factors) {
+    return dot(load<Words>(p), load<Words>(factors));
+  };
+  for (int i = 0; i < 2 * width + 2 * kReach; i += 16) {
+    const auto row = [&](std::size_t k) { return words_at(rows[k] - kReach + i); };
+    const Words middle = row(2);
+    store(sums + i, (row(0) + row(4)) + ((row(1) + row(3) + middle) << 2) + (middle << 1));
+  }
+  for (int i = 0; i < width; i += 16) {
+    const auto eight = [&](const std::int16_t* p) {
+      return (pairs(p, kFirst) + pairs(p + 2, kSecond) + pairs(p + 4, kThird) + 128) >> 8;
+    };
+    store_bytes(out + i, eight(sums + 2 * i), eight(sums + 2 * i + 16));
   }
 }
 

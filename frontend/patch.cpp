@@ -78,8 +78,8 @@ bool PatchLevel::capture(const ImageKernels& kernels, const GreyLevel& level, co
 }
 
 bool PatchLevel::solve_normal_equations(const ImageKernels& kernels, bool affine) {
-  PatchMoments moments;
-  kernels.moments(pixels_, moments);
+  PatchMoments moments{};
+  (affine ? kernels.moments : kernels.position_moments)(pixels_, moments);
   energy_ = moments.energy;
   if (!(energy_ > 0.0F)) return false;
   constexpr float kInverseMiddle = 2.0F / static_cast<float>(kPatchPixels);

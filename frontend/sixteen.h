@@ -47,14 +47,22 @@ inline Words pick(Words bytes, Words numbers) {
       _mm256_shuffle_epi8(reinterpret_cast<__m256i>(bytes), reinterpret_cast<__m256i>(numbers)));
 }
 
+/// Sixteen bytes.
+inline Words words_at(const std::uint8_t* p) {
+  return reinterpret_cast<Words>(_mm256_cvtepu8_epi16(_mm_loadu_si128(reinterpret_cast<const __m128i*>(p))));
+}
+
+/// Sixteen numbers from 0 to 255, of which `first` has eight, as bytes.
+inline void store_bytes(std::uint8_t* p, Ints first, Ints second) {
+  const __m256i words = _mm256_packs_epi32(reinterpret_cast<__m256i>(first), reinterpret_cast<__m256i>(second));
+  const __m256i bytes = _mm256_packus_epi16(words, words);  // in fours: 0 2, 0 2; 1 3, 1 3
+  const __m256i order = _mm256_setr_epi32(0, 4, 1, 5, 0, 4, 1, 5);
+  _mm_storeu_si128(reinterpret_cast<__m128i*>(p), _mm256_castsi256_si128(_mm256_permutevar8x32_epi32(bytes, order)));
+}
+
 inline Floats floats_at(const std::int16_t* p) {
   const __m128i words = _mm_loadu_si128(reinterpret_cast<const __m128i*>(p));
   return to_floats(reinterpret_cast<Ints>(_mm256_cvtepi16_epi32(words)));
-}
-
-inline void store_words(std::int16_t* p, Ints numbers) {
-  const Eight16 words = __builtin_convertvector(numbers, Eight16);
-  std::memcpy(p, &words, sizeof(words));
 }
 
 #else
@@ -136,10 +144,13 @@ inline Eight16 pick(Eight16 bytes, Eight16 numbers) {
 inline Words pick(const Words& bytes, const Words& numbers) {
   return {pick(bytes.low, numbers.low), pick(bytes.high, numbers.high)};
 }
-#else
+#endif
+
 /// Eight bytes.
 inline Eight16 words_of(const std::uint8_t* p) {
-#if defined(__SSE2__)
+#if defined(__aarch64__)
+  return reinterpret_cast<Eight16>(vmovl_u8(vld1_u8(p)));
+#elif defined(__SSE2__)
   return reinterpret_cast<Eight16>(
       _mm_unpacklo_epi8(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(p)), _mm_setzero_si128()));
 #else
@@ -148,7 +159,14 @@ inline Eight16 words_of(const std::uint8_t* p) {
   return result;
 #endif
 }
+inline Words words_at(const std::uint8_t* p) { return {words_of(p), words_of(p + 8)}; }
 
+inline void store_bytes(std::uint8_t* p, const Ints& first, const Ints& second) {
+  store_bytes(p, first);
+  store_bytes(p + 8, second);
+}
+
+#if !EAR_HAS_PICK
 inline bool any(Eight16 a) {
 #if defined(__SSE2__)
   return _mm_movemask_epi8(_mm_cmpeq_epi16(reinterpret_cast<__m128i>(a), _mm_setzero_si128())) != 0xffff;
@@ -171,17 +189,6 @@ inline Floats floats_at(const std::int16_t* p) {
 #else
   return to_floats(
       Ints{__builtin_convertvector(load<Four16>(p), Ints4), __builtin_convertvector(load<Four16>(p + 4), Ints4)});
-#endif
-}
-
-inline void store_words(std::int16_t* p, const Ints& numbers) {
-#if defined(__SSE2__)
-  const __m128i words =
-      _mm_packs_epi32(reinterpret_cast<__m128i>(numbers.low), reinterpret_cast<__m128i>(numbers.high));
-  _mm_storeu_si128(reinterpret_cast<__m128i*>(p), words);
-#else
-  store(p, __builtin_convertvector(numbers.low, Four16));
-  store(p + 4, __builtin_convertvector(numbers.high, Four16));
 #endif
 }
 
