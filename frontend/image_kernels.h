@@ -57,6 +57,13 @@ struct PatchMoments {
   float middle, middle2;               ///< sums of value and value^2 over the middle eight rows
 };
 
+/// Sums over the 15x15 pixels around one: of squared differences between the neighbours on both sides, of the product
+/// of the two, and of squared differences to the next pixel.
+struct TextureSums {
+  int across2, down2, across_down;
+  int right2, below2;
+};
+
 /// Whoever calls has checked that the patch lies inside of the level with its border, and that a row more above, two
 /// below, and kReadBehind bytes behind them may be read.
 constexpr int kReadBehind = 32;
@@ -79,6 +86,7 @@ struct ImageKernels {
   /// FAST's score of `width` pixels of a row, 0 where there is none, and perhaps where it is below `threshold`; three
   /// pixels around are read, and up to 31 more than `width` are looked at and written.
   void (*corner_scores)(const std::uint8_t* row, std::ptrdiff_t stride, int width, int threshold, std::uint8_t* scores);
+  void (*texture)(const std::uint8_t* middle, std::ptrdiff_t stride, TextureSums& sums);
   /// One row of an image half as large: `width` pixels, each 1/256 (1 4 6 4 1) (1 4 6 4 1)^T around every second pixel
   /// of the middle one of five rows, rounded; the first is around column 0. Columns from -2 to 2 width + 1 and up
   /// to 30 more are read, up to 15 more pixels than `width` are written. `sums`: room for 2 width + 64 numbers.

@@ -19,6 +19,7 @@ ImageKernels kernels_baseline() {
           baseline::moments,
           baseline::position_moments,
           baseline::corner_scores,
+          baseline::texture,
           baseline::halve_row};
 }
 

@@ -567,6 +567,31 @@ void halve_row(const std::array<const std::uint8_t*, 5>& rows, int width, std::i
   }
 }
 
+alignas(32) constexpr std::int16_t kAllButLast[16] = {-1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, 0};
+
+void texture(const std::uint8_t* middle, std::ptrdiff_t stride, TextureSums& out) {
+  constexpr int kReach = 7;
+  const Words counts = load<Words>(kAllButLast);
+  Ints across2{}, down2{}, across_down{}, right2{}, below2{};
+  for (int row = -kReach; row <= kReach; ++row) {
+    const std::uint8_t* const p = middle + row * stride - kReach;
+    const Words here = words_at(p);
+    const Words next = words_at(p + 1);
+    const Words under = words_at(p + stride);
+    const Words across = (next - words_at(p - 1)) & counts;
+    const Words down = (under - words_at(p - stride)) & counts;
+    const Words right = (next - here) & counts;
+    const Words below = (under - here) & counts;
+    across2 += dot(across, across);
+    down2 += dot(down, down);
+    across_down += dot(across, down);
+    right2 += dot(right, right);
+    below2 += dot(below, below);
+  }
+  const auto whole = [](const Ints& sums) { return static_cast<int>(sum(to_floats(sums))); };  // below 2^24: exact
+  out = {whole(across2), whole(down2), whole(across_down), whole(right2), whole(below2)};
+}
+
 constexpr int kBlock = 32;  // pixels at a time
 using Block = std::uint8_t[kBlock];
 

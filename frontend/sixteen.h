@@ -74,6 +74,7 @@ struct Words {
   Words operator*(const Words& b) const { return {low * b.low, high * b.high}; }
   Words operator+(std::int16_t b) const { return {low + b, high + b}; }
   Words operator&(std::int16_t b) const { return {low & b, high & b}; }
+  Words operator&(const Words& b) const { return {low & b.low, high & b.high}; }
   Words operator|(std::int16_t b) const { return {low | b, high | b}; }
   Words operator<<(std::int16_t b) const { return {low << b, high << b}; }
   Words operator>>(std::int16_t b) const { return {low >> b, high >> b}; }

@@ -203,6 +203,35 @@ TEST_CASE("kernels: the sums are those of the image between its pixels") {
   }
 }
 
+TEST_CASE("kernels: texture is the sums of differences over 15x15 pixels") {
+  ImagePyramid pyramid;
+  pyramid.build(view_of(random_texture(320, 240, 20)));
+  const GreyLevel& level = pyramid.level(0);
+  for (const ImageKernels& variant : image_kernels()) {
+    CAPTURE(name_of(variant.kind));
+    for (int trial = 0; trial < 50; ++trial) {
+      const int u = 10 + 6 * trial;
+      const int v = 10 + 4 * trial;
+      TextureSums expected{};
+      for (int row = v - 7; row <= v + 7; ++row) {
+        for (int column = u - 7; column <= u + 7; ++column) {
+          const std::uint8_t* const p = level.origin + row * level.stride + column;
+          const int across = p[1] - *(p - 1);
+          const int down = p[level.stride] - *(p - level.stride);
+          expected.across2 += across * across;
+          expected.down2 += down * down;
+          expected.across_down += across * down;
+          expected.right2 += (p[1] - p[0]) * (p[1] - p[0]);
+          expected.below2 += (p[level.stride] - p[0]) * (p[level.stride] - p[0]);
+        }
+      }
+      TextureSums found{};
+      variant.texture(level.origin + v * level.stride + u, level.stride, found);
+      REQUIRE(same_bits(found, expected));
+    }
+  }
+}
+
 TEST_CASE("kernels: a patch is what is between the pixels, and how that changes") {
   const ImageKernels kernels = image_kernels(Kernels::best);
   ImagePyramid pyramid;
