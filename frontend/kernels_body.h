@@ -101,35 +101,40 @@ inline HalfCorners fetch_each(const std::uint8_t* p, std::ptrdiff_t stride, cons
   return corners;
 }
 
-// Without picking: columns follow each other by one, with at most one gap or one twice, unless the warp stretches much.
+// Without picking: columns follow each other by one, with at most one gap or one twice, unless the warp stretches much;
+// rows are mostly the same two for all eight.
 inline HalfCorners fetch_near(const std::uint8_t* p, std::ptrdiff_t stride, const Eight16& x, const Eight16& y) {
   const Eight16 left = (x >> kNearBits) - Eight16{0, 1, 2, 3, 4, 5, 6, 7};
-  const Eight16 lower = (y << (15 - kNearBits)) >> 15;
   const int shift = smaller(left[0], left[7]);
   const Eight16 further = left - word(shift);  // all 0 or 1
-  if (any(further & word(~1))) return fetch_each(p, stride, x, y);
+  const int above = smaller(y[0], y[7]) >> kNearBits;
+  const Eight16 down = (y >> kNearBits) - word(above);  // likewise, unless it is steep
+  if (any((further | down) & word(~1))) return fetch_each(p, stride, x, y);
   const bool gap = any(further);
   const Eight16 which = word(0) - further;
-  Eight16 at_left[3], at_right[3];
-  for (int row = 0; row < 3; ++row) {
-    const std::uint8_t* const q = p + row * stride + shift;
-    at_left[row] = words_of(q);
-    at_right[row] = words_of(q + 1);
-    if (!gap) continue;
-    at_left[row] = choose(at_left[row], at_right[row], which);
-    at_right[row] = choose(at_right[row], words_of(q + 2), which);
-  }
-  return {choose(at_left[0], at_left[1], lower), choose(at_right[0], at_right[1], lower),
-          choose(at_left[1], at_left[2], lower), choose(at_right[1], at_right[2], lower)};
+  struct Row {
+    Eight16 left, right;
+  };
+  const auto fetch = [&](int row) -> Row {
+    const std::uint8_t* const q = p + (above + row) * stride + shift;
+    const Eight16 first = words_of(q);
+    const Eight16 second = words_of(q + 1);
+    if (!gap) return {first, second};
+    return {choose(first, second, which), choose(second, words_of(q + 2), which)};
+  };
+  const Row first = fetch(0);
+  const Row second = fetch(1);
+  if (!any(down)) return {first.left, first.right, second.left, second.right};
+  const Row third = fetch(2);
+  const Eight16 lower = word(0) - down;
+  return {choose(first.left, second.left, lower), choose(first.right, second.right, lower),
+          choose(second.left, third.left, lower), choose(second.right, third.right, lower)};
 }
 
 inline Corners fetch_near(const std::uint8_t* const (&p)[2], std::ptrdiff_t stride, const Words& x, const Words& y,
-                          bool steep) {
-  const auto fetch = [&](const std::uint8_t* q, const Eight16& half_x, const Eight16& half_y) {
-    return steep ? fetch_each(q, stride, half_x, half_y) : fetch_near(q, stride, half_x, half_y);
-  };
-  const HalfCorners low = fetch(p[0], x.low, y.low);
-  const HalfCorners high = fetch(p[1], x.high, y.high);
+                          bool /*steep*/) {
+  const HalfCorners low = fetch_near(p[0], stride, x.low, y.low);
+  const HalfCorners high = fetch_near(p[1], stride, x.high, y.high);
   return {{low.left, high.left},
           {low.right, high.right},
           {low.left_below, high.left_below},

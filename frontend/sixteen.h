@@ -88,7 +88,7 @@ inline Eight16 choose(Eight16 first, Eight16 second, Eight16 mask) {
   return reinterpret_cast<Eight16>(_mm_blendv_epi8(reinterpret_cast<__m128i>(first), reinterpret_cast<__m128i>(second),
                                                    reinterpret_cast<__m128i>(mask)));
 #else
-  return (first & ~mask) | (second & mask);
+  return first ^ ((first ^ second) & mask);
 #endif
 }
 inline Words choose(const Words& first, const Words& second, const Words& mask) {
