@@ -1,7 +1,7 @@
 // The arithmetic of images and patches, once for each vector unit: one program holds them all, and takes the best one
-// that the processor has. All variants give the same bits: pixels are interpolated in integers along the rows, floats
-// are added up in eight columns and in the same order, and no product is fused with a sum. docs/performance.md,
-// "Kernels".
+// that the processor has. All variants give the same bits: pixels are interpolated and multiplied in whole numbers,
+// what is float is added up in eight columns and in the same order, and no product is fused with a sum.
+// docs/performance.md, "Kernels".
 #pragma once
 
 #include <array>

@@ -24,9 +24,9 @@ constexpr int kNearOne = 1 << kNearBits;
 constexpr int kLessBits = kFixedBits - kNearBits;
 
 // Between pixels, values have six bits behind the point; with four they go into sums of products, which 32 bits hold.
+// interpolate() and less() round down, by 2.5 of the smaller units in the mean.
 constexpr int kBetweenBits = 6;
-constexpr float kRounding =
-    2.5F;  // of these units: what the steps of interpolate() and less() round down by, in the mean
+constexpr float kRounding = 2.5F;
 
 // Added to coordinates before they are cut off, so that those in the border are positive and round down as well.
 constexpr int kOffset = 64;
@@ -362,8 +362,7 @@ void compare(const GreyLevel& level, const PatchPlace& place, const PatchPixels&
   photometry.put(sums);
 }
 
-// What compare() gives at places one column of the patch apart, from pixels that are taken once. The row's lower half
-// of the next columns follows the upper half of these.
+// What compare() gives at places one column of the patch apart, from pixels that are taken once.
 void compare_along(const GreyLevel& level, const PatchPlace& place, const PatchPixels& patch,
                    std::array<AlignmentSums, kPatchSize>& sums) {
   constexpr int kRows = kSize - 2 * kSkip;
