@@ -13,7 +13,6 @@ constexpr std::size_t kCandidates = 5;   // of one cell, ranked by FAST's score,
 constexpr float kMinStrength = 1000.0F;  // [grey^2] 3 grey values of noise then move a patch by 0.15 px
 constexpr float kNoiseGrowth = 1.36F;    // wider_than_noise(): noise exceeds it with probability 1e-4
 constexpr int kMaxPerCell = 3;
-constexpr int kReach = 7;  // [px] of the surrounding that is looked at: 15x15 pixels
 
 bool far_from_all(const Eigen::Vector2f& pixel, const std::vector<Eigen::Vector2f>& others, float distance) {
   return std::none_of(others.begin(), others.end(), [&](const Eigen::Vector2f& other) {
@@ -21,22 +20,12 @@ bool far_from_all(const Eigen::Vector2f& pixel, const std::vector<Eigen::Vector2
   });
 }
 
-// Smaller eigenvalue of the structure matrix of 15x15 pixels around a pixel.
-float corner_strength(const GreyLevel& image, int u, int v) {
-  int xx = 0, xy = 0, yy = 0;
-  for (int row = v - kReach; row <= v + kReach; ++row) {
-    const std::uint8_t* p = image.origin + row * image.stride + u - kReach;
-    for (int column = 0; column <= 2 * kReach; ++column, ++p) {
-      const int gx = p[1] - *(p - 1);
-      const int gy = p[image.stride] - *(p - image.stride);
-      xx += gx * gx;
-      xy += gx * gy;
-      yy += gy * gy;
-    }
-  }
-  const float a = 0.125F * static_cast<float>(xx + yy);  // half the trace; gradients are differences over two pixels
-  const float b = 0.125F * static_cast<float>(xx - yy);
-  const float c = 0.25F * static_cast<float>(xy);
+// Smaller eigenvalue of the structure matrix of 15x15 pixels.
+float corner_strength(const TextureSums& sums) {
+  // Half the trace; gradients are differences over two pixels.
+  const float a = 0.125F * static_cast<float>(sums.across2 + sums.down2);
+  const float b = 0.125F * static_cast<float>(sums.across2 - sums.down2);
+  const float c = 0.25F * static_cast<float>(sums.across_down);
   return a - std::sqrt(b * b + c * c);
 }
 
@@ -46,23 +35,9 @@ float corner_strength(const GreyLevel& image, int u, int v) {
 // 225 the ratio of the sums is 1 with a standard deviation of 0.096. What is wider than a pixel differs more over two
 // pixels, as all that a lens has drawn: a step twice, a slope four times. The size of the noise cancels; a hot pixel
 // counts alike in both sums; rows or columns that are off as a whole show in one of the two directions only.
-bool wider_than_noise(const GreyLevel& image, int u, int v) {
-  int x1 = 0, x2 = 0, y1 = 0, y2 = 0;  // sums of squared differences over one and two pixels
-  for (int row = v - kReach; row <= v + kReach; ++row) {
-    const std::uint8_t* p = image.origin + row * image.stride + u - kReach;
-    for (int column = 0; column <= 2 * kReach; ++column, ++p) {
-      const int right = p[1] - p[0];
-      const int across = p[1] - *(p - 1);
-      const int below = p[image.stride] - p[0];
-      const int down = p[image.stride] - *(p - image.stride);
-      x1 += right * right;
-      x2 += across * across;
-      y1 += below * below;
-      y2 += down * down;
-    }
-  }
-  return static_cast<float>(x2) > kNoiseGrowth * static_cast<float>(x1) &&
-         static_cast<float>(y2) > kNoiseGrowth * static_cast<float>(y1);
+bool wider_than_noise(const TextureSums& sums) {
+  return static_cast<float>(sums.across2) > kNoiseGrowth * static_cast<float>(sums.right2) &&
+         static_cast<float>(sums.down2) > kNoiseGrowth * static_cast<float>(sums.below2);
 }
 
 // Half a pixel right and down of a pixel lies the middle of an even patch that needs no interpolation.
@@ -108,6 +83,7 @@ std::optional<Corner> Detector::best_in_cell(const ImagePyramid& pyramid, std::s
   const PixelArea area = area_of(cell);
   if (area.width <= 0 || area.height <= 0) return std::nullopt;
   fast_.find(pyramid, area, kMinScore);
+  const GreyLevel& image = pyramid.level(0);
   Corner best;
   int best_score = 0;
   for (std::size_t candidates = 0; candidates < kCandidates;) {
@@ -115,9 +91,11 @@ std::optional<Corner> Detector::best_in_cell(const ImagePyramid& pyramid, std::s
     if (!corner || (corner->score < kGoodScore && best_score >= kGoodScore)) break;
     if (!far_from_all(patch_centre(*corner), occupied_, min_distance_)) continue;
     ++candidates;
-    const float strength = corner_strength(pyramid.level(0), corner->u, corner->v);
+    TextureSums sums;
+    pyramid.kernels().texture(image.origin + corner->v * image.stride + corner->u, image.stride, sums);
+    const float strength = corner_strength(sums);
     if (strength < kMinStrength || strength <= best.strength) continue;
-    if (!wider_than_noise(pyramid.level(0), corner->u, corner->v)) continue;
+    if (!wider_than_noise(sums)) continue;
     best = {patch_centre(*corner), strength};
     best_score = corner->score;
   }

@@ -27,17 +27,11 @@ using Ints = int __attribute__((vector_size(32)));
 inline Floats to_floats(Ints a) { return __builtin_convertvector(a, Floats); }
 inline Ints to_ints(Floats a) { return __builtin_convertvector(a, Ints); }  // towards 0
 
-inline float sum(Floats a) { return ((a[0] + a[4]) + (a[2] + a[6])) + ((a[1] + a[5]) + (a[3] + a[7])); }
-
-inline bool any(Ints a) {
-  const auto bits = reinterpret_cast<__m256i>(a);
-  return _mm256_testz_si256(bits, bits) == 0;
-}
-
-/// Where a number is negative the second, else the first.
-inline Ints choose(Ints first, Ints second, Ints number) {
-  return reinterpret_cast<Ints>(_mm256_blendv_ps(reinterpret_cast<__m256>(first), reinterpret_cast<__m256>(second),
-                                                 reinterpret_cast<__m256>(number)));
+inline float sum(Floats a) {  // of both halves, then of both halves of that
+  const auto all = reinterpret_cast<__m256>(a);
+  const __m128 four = _mm_add_ps(_mm256_castps256_ps128(all), _mm256_extractf128_ps(all, 1));
+  const __m128 two = _mm_add_ps(four, _mm_movehl_ps(four, four));
+  return two[0] + two[1];
 }
 
 /// Products of the lower and of the upper 16 bits, added.
@@ -53,12 +47,6 @@ inline void store_bytes(std::uint8_t* p, Ints numbers) {
 }
 
 #define EAR_HAS_PICK 1
-/// Bytes of the 16 at `bytes` by their numbers; 0 for numbers from 128 on.
-inline Ints pick(const std::uint8_t* bytes, Ints numbers) {
-  const __m128i row = _mm_loadu_si128(reinterpret_cast<const __m128i*>(bytes));
-  return reinterpret_cast<Ints>(
-      _mm256_shuffle_epi8(_mm256_broadcastsi128_si256(row), reinterpret_cast<__m256i>(numbers)));
-}
 
 #else
 
@@ -84,7 +72,9 @@ struct Ints {
   Ints operator+(int b) const { return {low + b, high + b}; }
   Ints operator-(int b) const { return {low - b, high - b}; }
   Ints operator|(int b) const { return {low | b, high | b}; }
+  Ints operator*(int b) const { return {low * b, high * b}; }
   Ints operator&(int b) const { return {low & b, high & b}; }
+  Ints operator&(const Ints& b) const { return {low & b.low, high & b.high}; }
   Ints operator<<(int b) const { return {low << b, high << b}; }
   Ints operator>>(int b) const { return {low >> b, high >> b}; }
   Ints operator>(int b) const { return {low > b, high > b}; }
@@ -101,30 +91,12 @@ inline Ints to_ints(const Floats& a) {
 
 inline float sum(const Floats& a) {
   const Floats4 s = a.low + a.high;
-  return (s[0] + s[2]) + (s[1] + s[3]);
-}
-
-inline Ints4 choose(Ints4 first, Ints4 second, Ints4 number) {
-#if defined(__SSE4_1__)
-  return reinterpret_cast<Ints4>(_mm_blendv_ps(reinterpret_cast<__m128>(first), reinterpret_cast<__m128>(second),
-                                               reinterpret_cast<__m128>(number)));
-#else
-  const Ints4 mask = number >> 31;
-  return (first & ~mask) | (second & mask);
-#endif
-}
-inline Ints choose(const Ints& first, const Ints& second, const Ints& number) {
-  return {choose(first.low, second.low, number.low), choose(first.high, second.high, number.high)};
-}
-
-inline bool any(const Ints& a) {
-  const Ints4 both = a.low | a.high;
 #if defined(__SSE2__)
-  return _mm_movemask_epi8(_mm_cmpeq_epi32(reinterpret_cast<__m128i>(both), _mm_setzero_si128())) != 0xffff;
-#elif defined(__aarch64__)
-  return vmaxvq_u32(reinterpret_cast<uint32x4_t>(both)) != 0;
+  const auto four = reinterpret_cast<__m128>(s);
+  const __m128 two = _mm_add_ps(four, _mm_movehl_ps(four, four));
+  return two[0] + two[1];
 #else
-  return (both[0] | both[1] | both[2] | both[3]) != 0;
+  return (s[0] + s[2]) + (s[1] + s[3]);
 #endif
 }
 
@@ -152,41 +124,10 @@ inline void store_bytes(std::uint8_t* p, const Ints& numbers) {
 #endif
 }
 
-#if defined(__SSSE3__)
+#if defined(__SSSE3__) || defined(__aarch64__)
 #define EAR_HAS_PICK 1
-inline Ints pick(const std::uint8_t* bytes, const Ints& numbers) {
-  const __m128i row = _mm_loadu_si128(reinterpret_cast<const __m128i*>(bytes));
-  return {reinterpret_cast<Ints4>(_mm_shuffle_epi8(row, reinterpret_cast<__m128i>(numbers.low))),
-          reinterpret_cast<Ints4>(_mm_shuffle_epi8(row, reinterpret_cast<__m128i>(numbers.high)))};
-}
-#elif defined(__aarch64__)
-#define EAR_HAS_PICK 1
-inline Ints pick(const std::uint8_t* bytes, const Ints& numbers) {
-  const uint8x16_t row = vld1q_u8(bytes);
-  return {reinterpret_cast<Ints4>(vqtbl1q_u8(row, reinterpret_cast<uint8x16_t>(numbers.low))),
-          reinterpret_cast<Ints4>(vqtbl1q_u8(row, reinterpret_cast<uint8x16_t>(numbers.high)))};
-}
 #else
 #define EAR_HAS_PICK 0
-inline Ints count_up() { return {Ints4{0, 1, 2, 3}, Ints4{4, 5, 6, 7}}; }
-
-/// Eight bytes from `p`, each with the next one in the upper 16 bits.
-inline Ints neighbours(const std::uint8_t* p) {
-#if defined(__SSE2__)
-  const __m128i zero = _mm_setzero_si128();
-  const __m128i left = _mm_unpacklo_epi8(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(p)), zero);
-  const __m128i right = _mm_unpacklo_epi8(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(p + 1)), zero);
-  return {reinterpret_cast<Ints4>(_mm_unpacklo_epi16(left, right)),
-          reinterpret_cast<Ints4>(_mm_unpackhi_epi16(left, right))};
-#else
-  Ints result{};
-  for (int i = 0; i < 4; ++i) {
-    result.low[i] = p[i] | (p[i + 1] << 16);
-    result.high[i] = p[i + 4] | (p[i + 5] << 16);
-  }
-  return result;
-#endif
-}
 #endif
 
 #endif  // __AVX2__
@@ -201,13 +142,6 @@ Eight load(const Number* p) {
 template <class Eight, class Number>
 void store(Number* p, const Eight& numbers) {
   std::memcpy(p, &numbers, sizeof(numbers));
-}
-
-/// One of the eight.
-inline int at(const Ints& numbers, int index) {
-  int number;
-  std::memcpy(&number, reinterpret_cast<const unsigned char*>(&numbers) + 4 * index, sizeof(number));
-  return number;
 }
 
 /// All the same.

@@ -41,7 +41,7 @@ void FastCorners::find(const ImagePyramid& pyramid, const PixelArea& area, int t
   for (int row = 0; row < area.height; ++row) {
     std::uint8_t* const out = first + row * stride;
     pyramid.kernels().corner_scores(image.origin + (area.top + row) * image.stride + area.left, image.stride,
-                                    area.width, out);
+                                    area.width, threshold, out);
     std::fill(out + area.width, out + stride - 1, std::uint8_t{0});
   }
   found_.clear();

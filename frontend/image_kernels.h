@@ -1,7 +1,7 @@
 // The arithmetic of images and patches, once for each vector unit: one program holds them all, and takes the best one
-// that the processor has. All variants give the same bits: pixels are interpolated in integers along the rows, floats
-// are added up in eight columns and in the same order, and no product is fused with a sum. docs/performance.md,
-// "Kernels".
+// that the processor has. All variants give the same bits: pixels are interpolated and multiplied in whole numbers,
+// what is float is added up in eight columns and in the same order, and no product is fused with a sum.
+// docs/performance.md, "Kernels".
 #pragma once
 
 #include <array>
@@ -26,11 +26,14 @@ struct PatchPlace {
   std::array<float, 2> perspective;
 };
 
+constexpr float kPatchUnit = 1.0F / 16.0F;    // [grey values] of a patch's pixels
+constexpr float kGradientUnit = 1.0F / 8.0F;  // [grey values / px]
+
 /// A patch, row by row. Offsets of its pixels from the centre are -7.5, -6.5, ... 7.5.
 struct PatchPixels {
-  alignas(32) std::array<float, kPatchPixels> value;  ///< mean removed
-  alignas(32) std::array<float, kPatchPixels> gradient_x, gradient_y;
-  float mean;
+  alignas(32) std::array<std::int16_t, kPatchPixels> value;                   ///< mean removed, in kPatchUnit
+  alignas(32) std::array<std::int16_t, kPatchPixels> gradient_x, gradient_y;  ///< in kGradientUnit
+  float mean;                                                                 ///< [grey values]
 };
 
 /// Sums over a patch of the image under it (less the patch's mean), and of its products with the patch and its
@@ -54,8 +57,15 @@ struct PatchMoments {
   float middle, middle2;               ///< sums of value and value^2 over the middle eight rows
 };
 
-/// Whoever calls has checked that the patch lies inside of the level with its border, and that a row more on either
-/// side, and kReadBehind bytes behind that, may be read.
+/// Sums over the 15x15 pixels around one: of squared differences between the neighbours on both sides, of the product
+/// of the two, and of squared differences to the next pixel.
+struct TextureSums {
+  int across2, down2, across_down;
+  int right2, below2;
+};
+
+/// Whoever calls has checked that the patch lies inside of the level with its border, and that a row more above, two
+/// below, and kReadBehind bytes behind them may be read.
 constexpr int kReadBehind = 32;
 
 struct ImageKernels {
@@ -65,16 +75,22 @@ struct ImageKernels {
   void (*align_affine)(const GreyLevel& level, const PatchPlace& place, const PatchPixels& patch, AlignmentSums& sums);
   /// image, image2 and product over the middle eight rows.
   void (*compare)(const GreyLevel& level, const PatchPlace& place, const PatchPixels& patch, AlignmentSums& sums);
+  /// What compare() gives at sixteen places: the patch's centre there, and one column of it further each time.
+  void (*compare_along)(const GreyLevel& level, const PatchPlace& place, const PatchPixels& patch,
+                        std::array<AlignmentSums, kPatchSize>& sums);
   /// Takes the upright patch around `centre`; reads two more pixels on each side.
   void (*capture)(const GreyLevel& level, const std::array<float, 2>& centre, PatchPixels& patch);
   void (*moments)(const PatchPixels& patch, PatchMoments& moments);
-  /// FAST's score of `width` pixels of a row, 0 where there is none; three pixels around are read, and up to 31 more
-  /// than `width` are looked at and written.
-  void (*corner_scores)(const std::uint8_t* row, std::ptrdiff_t stride, int width, std::uint8_t* scores);
+  /// Without those that have an offset: the first of each.
+  void (*position_moments)(const PatchPixels& patch, PatchMoments& moments);
+  /// FAST's score of `width` pixels of a row, 0 where there is none, and perhaps where it is below `threshold`; three
+  /// pixels around are read, and up to 31 more than `width` are looked at and written.
+  void (*corner_scores)(const std::uint8_t* row, std::ptrdiff_t stride, int width, int threshold, std::uint8_t* scores);
+  void (*texture)(const std::uint8_t* middle, std::ptrdiff_t stride, TextureSums& sums);
   /// One row of an image half as large: `width` pixels, each 1/256 (1 4 6 4 1) (1 4 6 4 1)^T around every second pixel
-  /// of the middle one of five rows, rounded; the first is around column 0. Columns from -2 to 2 width + 1 are read, up
-  /// to seven more pixels than `width` are written. `sums`: room for 2 width + 32 numbers.
-  void (*halve_row)(const std::array<const std::uint8_t*, 5>& rows, int width, std::uint16_t* sums, std::uint8_t* out);
+  /// of the middle one of five rows, rounded; the first is around column 0. Columns from -2 to 2 width + 1 and up
+  /// to 30 more are read, up to 15 more pixels than `width` are written. `sums`: room for 2 width + 64 numbers.
+  void (*halve_row)(const std::array<const std::uint8_t*, 5>& rows, int width, std::int16_t* sums, std::uint8_t* out);
 };
 
 /// Those that this build has and this processor can run, the best one last.

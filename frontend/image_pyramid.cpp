@@ -89,7 +89,7 @@ void ImagePyramid::allocate(int width, int height) {
     level.height = height;
     level.border = kBorder;
     level.stride = (width + 2 * kBorder + 15) / 16 * 16;
-    const std::ptrdiff_t rows = height + 2 * kBorder + 2;  // kernels read a row more on either side, see kReadBehind
+    const std::ptrdiff_t rows = height + 2 * kBorder + 3;  // kernels read more than they use, see kReadBehind
     level.memory.resize(static_cast<std::size_t>(rows * level.stride + kReadBehind));
     level.origin = level.memory.data() + (1 + kBorder) * level.stride + kBorder;
     level.made.resize(static_cast<std::size_t>(bands_of(height)));

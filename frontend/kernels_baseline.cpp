@@ -14,9 +14,12 @@ ImageKernels kernels_baseline() {
           baseline::align_position,
           baseline::align_affine,
           baseline::compare,
+          baseline::compare_along,
           baseline::capture,
           baseline::moments,
+          baseline::position_moments,
           baseline::corner_scores,
+          baseline::texture,
           baseline::halve_row};
 }
 

@@ -5,6 +5,7 @@
 
 #include "frontend/eight.h"
 #include "frontend/image_kernels.h"
+#include "frontend/sixteen.h"
 
 // NOLINTBEGIN(modernize-avoid-c-arrays,misc-definitions-in-headers): see above
 namespace ear::EAR_VARIANT {
@@ -14,11 +15,18 @@ constexpr int kGroups = kPatchSize / 8;  // of eight columns
 constexpr int kSize = kPatchSize;
 constexpr int kSkip = kSize / 4;  // rows above and below that compare() leaves out
 
-// Pixel coordinates in fixed point: integer part and weight are cheap to take apart.
+// Coordinates are in fixed point: with 16 bits behind the point those of a row's first pixel, with 11 the sixteen of a
+// row, from the upper left one of the pixels that are fetched for them.
 constexpr int kFixedBits = 16;
 constexpr int kFixedOne = 1 << kFixedBits;
-constexpr int kWeightBits = 14;  // of a pixel against its neighbour in the row: products of 16 bits
-constexpr float kUnit = static_cast<float>(1 << kWeightBits);  // of interpolated pixels: a grey value
+constexpr int kNearBits = 11;
+constexpr int kNearOne = 1 << kNearBits;
+constexpr int kLessBits = kFixedBits - kNearBits;
+
+// Between pixels, values have six bits behind the point; with four they go into sums of products, which 32 bits hold.
+// interpolate() and less() round down, by 2.5 of the smaller units in the mean.
+constexpr int kBetweenBits = 6;
+constexpr float kRounding = 2.5F;
 
 // Added to coordinates before they are cut off, so that those in the border are positive and round down as well.
 constexpr int kOffset = 64;
@@ -28,87 +36,132 @@ inline Ints to_fixed(const Floats& values) { return to_ints(values * static_cast
 inline std::uint8_t lesser(std::uint8_t a, std::uint8_t b) { return b < a ? b : a; }
 inline std::uint8_t greater(std::uint8_t a, std::uint8_t b) { return b > a ? b : a; }
 inline int smaller(int a, int b) { return b < a ? b : a; }
+inline std::int16_t word(int number) { return static_cast<std::int16_t>(number); }
 
-// Pixels at (x, y) and (x, y + 1), each with its right neighbour in the upper 16 bits.
-struct Pairs {
-  Ints above, below;
+// Pixels to the left and right above of sixteen places and below, and what of the way from the first to the second the
+// places are: 1 is 32768.
+struct Corners {
+  Words left, right, left_below, right_below;
 };
 
-inline Ints pairs_of(const int* bytes) {  // both in the lower 16 bits
-  const Ints both = load<Ints>(bytes);
-  return (both & 0xff) | ((both & 0xff00) << 8);
+// Of pixels, with kBetweenBits.
+inline Words between(const Words& left, const Words& right, const Words& across) {
+  return (left << kBetweenBits) + multiply_high((right - left) << (kBetweenBits + 1), across);
 }
 
-// Any pixels, one by one; `x` and `y` in fixed point, from that at `p`.
-inline Pairs fetch_each(const std::uint8_t* p, std::ptrdiff_t stride, const Ints& x, const Ints& y) {
-  alignas(32) int at_x[8], at_y[8], above[8], below[8];
-  store(at_x, x >> kFixedBits);
-  store(at_y, y >> kFixedBits);
-  for (int i = 0; i < 8; ++i) {
-    const std::uint8_t* const q = p + at_y[i] * stride + at_x[i];
-    std::uint16_t pair;
-    std::memcpy(&pair, q, 2);
-    above[i] = pair;
-    std::memcpy(&pair, q + stride, 2);
-    below[i] = pair;
-  }
-  return {pairs_of(above), pairs_of(below)};
+inline Words interpolate(const Corners& corners, const Words& across, const Words& down) {
+  const Words above = between(corners.left, corners.right, across);
+  const Words below = between(corners.left_below, corners.right_below, across);
+  return above + multiply_high((below - above) << 1, down);
 }
 
-// Pixels that are within 15 columns and two rows from that at `p`.
-inline Pairs fetch_near(const std::uint8_t* p, std::ptrdiff_t stride, const Ints& x, const Ints& y) {
 #if EAR_HAS_PICK
-  const Ints left = x >> kFixedBits;
-  const Ints numbers = (left | (left << 16)) + static_cast<int>(0x80018000U);
-  const Ints first = pick(p, numbers);
-  const Ints second = pick(p + stride, numbers);
-  const Ints third = pick(p + 2 * stride, numbers);
-  const Ints lower = y << (31 - kFixedBits);  // negative where the second row is above
-  return {choose(first, second, lower), choose(second, third, lower)};
-#else
-  const Ints left = (x >> kFixedBits) - count_up();
-  const Ints lower = y << (31 - kFixedBits);
-  const auto rows = [&](const std::uint8_t* q) -> Pairs {
-    const Ints second = neighbours(q + stride);
-    return {choose(neighbours(q), second, lower), choose(second, neighbours(q + 2 * stride), lower)};
-  };
-  const int shift = smaller(at(left, 0), at(left, 7));
-  const Ints further = left - shift;  // all 0 or 1, unless the warp stretches much
-  if (!any(further)) return rows(p + shift);
-  if (any(further & ~1)) return fetch_each(p, stride, x, y);
-  const Pairs near = rows(p + shift);
-  const Pairs far = rows(p + shift + 1);
-  const Ints which = further << 31;
-  return {choose(near.above, far.above, which), choose(near.below, far.below, which)};
-#endif
+
+// Pixels that are within 15 columns and two rows from those at `p`, one for either half; three rows where it is steep.
+inline Corners fetch_near(const std::uint8_t* const (&p)[2], std::ptrdiff_t stride, const Words& x, const Words& y,
+                          bool steep) {
+  const Words left = (x >> kNearBits) | word(0x8000 - 0x10000);
+  const Words right = left + word(1);
+  const Words lower = (y << (15 - kNearBits)) >> 15;  // where the first row is above
+  const Words first = bytes_at(p[0], p[1]);
+  const Words second = bytes_at(p[0] + stride, p[1] + stride);
+  const Words third = bytes_at(p[0] + 2 * stride, p[1] + 2 * stride);
+  const Words left_second = pick(second, left);
+  const Words right_second = pick(second, right);
+  const Words left_third = pick(third, left);
+  const Words right_third = pick(third, right);
+  Corners corners{choose(pick(first, left), left_second, lower), choose(pick(first, right), right_second, lower),
+                  choose(left_second, left_third, lower), choose(right_second, right_third, lower)};
+  if (steep) {
+    const Words fourth = bytes_at(p[0] + 3 * stride, p[1] + 3 * stride);
+    const Words lowest = (y << (14 - kNearBits)) >> 15;  // where two rows are above
+    corners = {choose(corners.left, left_third, lowest), choose(corners.right, right_third, lowest),
+               choose(corners.left_below, pick(fourth, left), lowest),
+               choose(corners.right_below, pick(fourth, right), lowest)};
+  }
+  return corners;
 }
 
-// Eight pixels of the image in units of 1 / kUnit of a grey value, interpolated.
-inline Floats interpolate(const Pairs& pairs, const Ints& x, const Ints& y) {
-  const Ints weight = (x >> (kFixedBits - kWeightBits)) & ((1 << kWeightBits) - 1);
-  const Ints weights = ((weight << 16) - weight) + (1 << kWeightBits);  // of the left pixel below, of the right above
-  const Floats top = to_floats(add_products(pairs.above, weights));
-  const Floats bottom = to_floats(add_products(pairs.below, weights));
-  const Floats down = to_floats(y & (kFixedOne - 1)) * (1.0F / static_cast<float>(kFixedOne));
-  return top + down * (bottom - top);
+#else
+
+// Of one half.
+struct HalfCorners {
+  Eight16 left, right, left_below, right_below;
+};
+
+inline HalfCorners fetch_each(const std::uint8_t* p, std::ptrdiff_t stride, const Eight16& x, const Eight16& y) {
+  HalfCorners corners;
+  for (int i = 0; i < 8; ++i) {
+    const std::uint8_t* const q = p + (y[i] >> kNearBits) * stride + (x[i] >> kNearBits);
+    corners.left[i] = q[0];
+    corners.right[i] = q[1];
+    corners.left_below[i] = q[stride];
+    corners.right_below[i] = q[stride + 1];
+  }
+  return corners;
+}
+
+// Without picking: columns follow each other by one, with at most one gap or one twice, unless the warp stretches much;
+// rows are mostly the same two for all eight.
+inline HalfCorners fetch_near(const std::uint8_t* p, std::ptrdiff_t stride, const Eight16& x, const Eight16& y) {
+  const Eight16 left = (x >> kNearBits) - Eight16{0, 1, 2, 3, 4, 5, 6, 7};
+  const int shift = smaller(left[0], left[7]);
+  const Eight16 further = left - word(shift);  // all 0 or 1
+  const int above = smaller(y[0], y[7]) >> kNearBits;
+  const Eight16 down = (y >> kNearBits) - word(above);  // likewise, unless it is steep
+  if (any((further | down) & word(~1))) return fetch_each(p, stride, x, y);
+  const bool gap = any(further);
+  const Eight16 which = word(0) - further;
+  struct Row {
+    Eight16 left, right;
+  };
+  const auto fetch = [&](int row) -> Row {
+    const std::uint8_t* const q = p + (above + row) * stride + shift;
+    const Eight16 first = words_of(q);
+    const Eight16 second = words_of(q + 1);
+    if (!gap) return {first, second};
+    return {choose(first, second, which), choose(second, words_of(q + 2), which)};
+  };
+  const Row first = fetch(0);
+  const Row second = fetch(1);
+  if (!any(down)) return {first.left, first.right, second.left, second.right};
+  const Row third = fetch(2);
+  const Eight16 lower = word(0) - down;
+  return {choose(first.left, second.left, lower), choose(first.right, second.right, lower),
+          choose(second.left, third.left, lower), choose(second.right, third.right, lower)};
+}
+
+inline Corners fetch_near(const std::uint8_t* const (&p)[2], std::ptrdiff_t stride, const Words& x, const Words& y,
+                          bool /*steep*/) {
+  const HalfCorners low = fetch_near(p[0], stride, x.low, y.low);
+  const HalfCorners high = fetch_near(p[1], stride, x.high, y.high);
+  return {{low.left, high.left},
+          {low.right, high.right},
+          {low.left_below, high.left_below},
+          {low.right_below, high.right_below}};
+}
+
+#endif
+
+inline Floats count_up() {
+  alignas(32) constexpr float kFirst[8] = {0.0F, 1.0F, 2.0F, 3.0F, 4.0F, 5.0F, 6.0F, 7.0F};
+  return load<Floats>(kFirst);
 }
 
 // Offsets from the patch's centre of eight pixels in a row.
-inline Floats offsets(int group) {
-  alignas(32) constexpr float kFirst[8] = {0.0F, 1.0F, 2.0F, 3.0F, 4.0F, 5.0F, 6.0F, 7.0F};
-  return load<Floats>(kFirst) + (static_cast<float>(8 * group) - kPatchHalf);
-}
+inline Floats offsets(int group) { return count_up() + (static_cast<float>(8 * group) - kPatchHalf); }
 
 inline float offset(int row) { return static_cast<float>(row) - kPatchHalf; }
 
 inline float size(float value) { return value < 0.0F ? -value : value; }
 
-// Goes through a patch under a warp, row by row, eight columns at a time.
+// Pixels of a level under a warp, row by row of the patch.
 class Walk {
  public:
-  // With o = (column - half, y): A o (1 - perspective . o), in powers of the column.
-  Walk(const GreyLevel& level, const PatchPlace& place, int first_row)
-      : place_(place), stride_(level.stride), origin_(level.origin - kOffset * (level.stride + 1)) {
+  // Of rows from `first`: eight, or sixteen. With o = (column - half, y): A o (1 - perspective . o), in powers of the
+  // column.
+  Walk(const GreyLevel& level, const PatchPlace& place, int first, int rows)
+      : stride_(level.stride), origin_(level.origin - kOffset * (level.stride + 1)) {
     const float lx = place.perspective[0];
     const float ly = place.perspective[1];
     float steps[2], changes[2];
@@ -117,186 +170,277 @@ class Walk {
       const float ay = place.column_y[k];
       const float bend = -lx * ax;
       const float twist = -(ly * ax + lx * ay);  // change of the step from row to row
-      const float step = ax + kPatchHalf * lx * ax + kPatchHalf * lx * ax + offset(first_row) * twist;
-      for (int group = 0; group < kGroups; ++group) {
-        const Floats column = offsets(group) + kPatchHalf;
-        along_[k][group] = to_fixed(column * (column * bend + step));
-        twist_[k][group] = to_fixed(column * twist);
+      const float step = ax + kPatchHalf * lx * ax + kPatchHalf * lx * ax;
+      bend_[k] = to_fixed(bend);
+      for (int from = 0; from < rows; from += 8) {
+        const Floats y = count_up() + offset(first + from);
+        const Floats scale = all(1.0F + kPatchHalf * lx) - y * ly;
+        const Floats begin = (y * ay - kPatchHalf * ax) * scale + (place.centre[k] + static_cast<float>(kOffset));
+        store(begin_[k] + from, to_fixed(begin));
+        store(step_[k] + from, to_fixed(y * twist + step));
       }
-      steps[k] = step;
+      steps[k] = step + offset(first) * twist;
       changes[k] = static_cast<float>(kSize) * (2.0F * size(bend) + size(twist));  // of the step, at most
     }
     // Eight pixels lie near each other unless the warp turns or stretches a lot. The highest is the first or the last
     // of them, or above these by no more than the row bends, and than rounding.
-    const float margin = 13.0F * size(place.perspective[0] * place.column_x[1]) + 0.01F;
-    margin_ = to_fixed(margin);
-    near_ = steps[0] - changes[0] > 0.0F && 7.0F * (steps[0] + changes[0]) < 14.0F &&
-            7.0F * (size(steps[1]) + changes[1]) + margin < 0.99F;
+    const float margin = 13.0F * size(lx * place.column_x[1]) + 0.01F;
+    const float rise = 7.0F * (size(steps[1]) + changes[1]) + margin;
+    near_ = steps[0] - changes[0] > 0.0F && 7.0F * (steps[0] + changes[0]) < 14.0F && rise < 1.99F;
+    steep_ = rise > 0.99F;
+    if (near_) prepare(rows, to_fixed(margin));
   }
 
-  void begin_row(int row) {
-    const float y = offset(row);
-    const float scale = 1.0F + kPatchHalf * place_.perspective[0] - y * place_.perspective[1];
-    const float x0 = place_.centre[0] + (y * place_.column_y[0] - kPatchHalf * place_.column_x[0]) * scale;
-    const float y0 = place_.centre[1] + (y * place_.column_y[1] - kPatchHalf * place_.column_x[1]) * scale;
-    first_x_ = to_fixed(x0 + static_cast<float>(kOffset));
-    first_y_ = to_fixed(y0 + static_cast<float>(kOffset));
-  }
-
-  // Of the row that was begun, each group once.
-  Floats take(int group) {
-    const int near_x = (first_x_ + at(along_[0][group], 0)) >> kFixedBits;
-    const int highest = smaller(at(along_[1][group], 0), at(along_[1][group], 7));
-    const int near_y = (first_y_ + highest - margin_) >> kFixedBits;
-    const std::uint8_t* const p = origin_ + near_y * stride_ + near_x;
-    const Ints x = along_[0][group] + (first_x_ - (near_x << kFixedBits));
-    const Ints y = along_[1][group] + (first_y_ - (near_y << kFixedBits));
-    along_[0][group] += twist_[0][group];
-    along_[1][group] += twist_[1][group];
-    return interpolate(near_ ? fetch_near(p, stride_, x, y) : fetch_each(p, stride_, x, y), x, y);
-  }
+  // Row by row from the first: brightness with kBetweenBits behind the point.
+  [[nodiscard]] Words take(int row) const { return near_ ? take_near(row) : take_each(row); }
 
  private:
-  const PatchPlace& place_;
+  // For either half of a row: the pixels that are fetched, and where between them the first of the eight lies.
+  void prepare(int rows, int margin) {
+    constexpr int kHalf = 1 << (kLessBits - 1);
+    for (std::size_t k = 0; k < 2; ++k) {
+      alignas(32) std::int16_t bent[kSize];
+      const int bend = bend_[k];
+      for (int i = 0; i < 8; ++i) {
+        bent[i] = word((i * i * bend) >> kLessBits);
+        bent[i + 8] = word(((i * i + 16 * i) * bend) >> kLessBits);
+      }
+      bent_[k] = load<Words>(bent);
+      last_bent_[k][0] = bent[7];
+      last_bent_[k][1] = bent[15];
+    }
+    const auto stride = static_cast<int>(stride_);
+    for (int from = 0; from < rows; from += 8) {
+      for (std::size_t k = 0; k < 2; ++k) {
+        const Ints near_step = (load<Ints>(step_[k] + from) + kHalf) >> kLessBits;
+        store(near_step_[k] + from, near_step);
+      }
+      const Ints last = load<Ints>(near_step_[1] + from) * 7;
+      for (std::size_t half = 0; half < 2; ++half) {
+        Ints x = load<Ints>(begin_[0] + from);
+        Ints y = load<Ints>(begin_[1] + from);
+        if (half == 1) {
+          x += load<Ints>(step_[0] + from) * 8 + 64 * bend_[0];
+          y += load<Ints>(step_[1] + from) * 8 + 64 * bend_[1];
+        }
+        const Ints rise = last + last_bent_[1][half];
+        const Ints highest = y - margin + ((rise & (rise >> 31)) << kLessBits);
+        const Ints row = highest >> kFixedBits;
+        store(offset_[half] + from, row * stride + (x >> kFixedBits));
+        store(near_begin_[0][half] + from, ((x & (kFixedOne - 1)) + kHalf) >> kLessBits);
+        store(near_begin_[1][half] + from, (y - (row << kFixedBits) + kHalf) >> kLessBits);
+      }
+    }
+  }
+
+  [[nodiscard]] Words take_near(int row) const {
+    alignas(32) constexpr std::int16_t kColumns[kSize] = {0, 1, 2, 3, 4, 5, 6, 7, 0, 1, 2, 3, 4, 5, 6, 7};
+    const auto columns = load<Words>(kColumns);
+    const auto along = [&](std::size_t k) {
+      return columns * spread(word(near_step_[k][row])) + bent_[k] +
+             spread(word(near_begin_[k][0][row]), word(near_begin_[k][1][row]));
+    };
+    const Words x = along(0);
+    const Words y = along(1);
+    const std::uint8_t* const p[2] = {origin_ + offset_[0][row], origin_ + offset_[1][row]};
+    const auto weight = [](const Words& at) { return (at & word(kNearOne - 1)) << (15 - kNearBits); };
+    return interpolate(fetch_near(p, stride_, x, y, steep_), weight(x), weight(y));
+  }
+
+  [[nodiscard]] Words take_each(int row) const {
+    alignas(32) std::int16_t left[kSize], right[kSize], left_below[kSize], right_below[kSize];
+    alignas(32) std::int16_t across[kSize], down[kSize];
+    for (int i = 0; i < kSize; ++i) {
+      const int x = begin_[0][row] + i * step_[0][row] + i * i * bend_[0];
+      const int y = begin_[1][row] + i * step_[1][row] + i * i * bend_[1];
+      const std::uint8_t* const p = origin_ + (y >> kFixedBits) * stride_ + (x >> kFixedBits);
+      left[i] = p[0];
+      right[i] = p[1];
+      left_below[i] = p[stride_];
+      right_below[i] = p[stride_ + 1];
+      across[i] = word((x & (kFixedOne - 1)) >> 1);
+      down[i] = word((y & (kFixedOne - 1)) >> 1);
+    }
+    return interpolate({load<Words>(left), load<Words>(right), load<Words>(left_below), load<Words>(right_below)},
+                       load<Words>(across), load<Words>(down));
+  }
+
   std::ptrdiff_t stride_;
   const std::uint8_t* origin_;
   bool near_;
-  int margin_;
-  int first_x_ = 0;
-  int first_y_ = 0;
-  Ints along_[2][kGroups];  // from the first pixel of a row
-  Ints twist_[2][kGroups];  // their change from row to row
+  bool steep_;
+  int bend_[2];                              // half the change of the step from column to column
+  alignas(32) int begin_[2][kSize];          // by x and y, for each row: its first pixel,
+  alignas(32) int step_[2][kSize];           // and the way to the next
+  alignas(32) int near_step_[2][kSize];      // the same in kNearBits
+  alignas(32) int near_begin_[2][2][kSize];  // for either half, from the pixels that are fetched
+  alignas(32) int offset_[2][kSize];         // of these from the origin
+  Words bent_[2];
+  int last_bent_[2][2];
 };
 
-inline float grey(const Floats& sums) { return sum(sums) * (1.0F / kUnit); }
+inline float grey(const Ints& sums, float unit) { return sum(to_floats(sums)) * unit; }
 
+// Of the image under a patch, less the patch's mean; products with the patch and with itself.
 struct Photometry {
-  Floats image{}, image2{}, product{};
+  Ints image{}, image2{}, product{};
 
-  void add(const Floats& pixels, const Floats& value) {
-    image += pixels;
-    image2 += pixels * pixels;
-    product += pixels * value;
+  void add(const Words& pixels, const Words& value) {
+    image += dot(pixels, spread(1));
+    image2 += dot(pixels, pixels);
+    product += dot(pixels, value);
   }
   void put(AlignmentSums& sums) const {
-    sums.image = grey(image);
-    sums.image2 = grey(image2) * (1.0F / kUnit);
-    sums.product = grey(product);
+    sums.image = grey(image, kPatchUnit);
+    sums.image2 = grey(image2, kPatchUnit * kPatchUnit);
+    sums.product = grey(product, kPatchUnit * kPatchUnit);
   }
 };
 
+constexpr float kGradientProduct = kPatchUnit * kGradientUnit;
+
+// What is taken off pixels with kBetweenBits, before they become those of Photometry.
+inline Words level_of(const PatchPixels& patch) {
+  return spread(word(static_cast<int>(patch.mean * static_cast<float>(1 << kBetweenBits) + (0.5F - kRounding))));
+}
+inline Words less(const Words& pixels, const Words& level) { return (pixels - level) >> 2; }
+
 void align_position(const GreyLevel& level, const PatchPlace& place, const PatchPixels& patch, AlignmentSums& sums) {
-  Walk walk(level, place, 0);
-  const float mean = patch.mean * kUnit;
+  const Walk walk(level, place, 0, kSize);
+  const Words mean = level_of(patch);
   Photometry photometry;
-  Floats x{}, y{};
+  Ints x{}, y{};
   for (int row = 0; row < kSize; ++row) {
-    walk.begin_row(row);
-#pragma GCC unroll 2
-    for (int group = 0; group < kGroups; ++group) {
-      const int at = row * kSize + 8 * group;
-      const Floats pixels = walk.take(group) - mean;
-      photometry.add(pixels, load<Floats>(patch.value.data() + at));
-      x += load<Floats>(patch.gradient_x.data() + at) * pixels;
-      y += load<Floats>(patch.gradient_y.data() + at) * pixels;
-    }
+    const Words pixels = less(walk.take(row), mean);
+    photometry.add(pixels, load<Words>(patch.value.data() + row * kSize));
+    x += dot(pixels, load<Words>(patch.gradient_x.data() + row * kSize));
+    y += dot(pixels, load<Words>(patch.gradient_y.data() + row * kSize));
   }
   photometry.put(sums);
-  sums.x = grey(x);
-  sums.y = grey(y);
+  sums.x = grey(x, kGradientProduct);
+  sums.y = grey(y, kGradientProduct);
 }
 
 void align_affine(const GreyLevel& level, const PatchPlace& place, const PatchPixels& patch, AlignmentSums& sums) {
-  Walk walk(level, place, 0);
-  const float mean = patch.mean * kUnit;
+  alignas(32) constexpr std::int16_t kFromMiddle[kSize] = {-7, -6, -5, -4, -3, -2, -1, 0, 1, 2, 3, 4, 5, 6, 7, 8};
+  const Walk walk(level, place, 0, kSize);
+  const Words mean = level_of(patch);
+  const auto from_middle = load<Words>(kFromMiddle);
   Photometry photometry;
-  Floats x[kGroups] = {}, y[kGroups] = {};  // of columns: products with the offset in x wait until the end
-  Floats x_y{}, y_y{};
+  Ints x{}, y{}, x_x{}, y_x{};
+  Ints x_above{}, y_above{};  // sums of x and y as they are after each row: rows count 16, 15, ... 1 times
   for (int row = 0; row < kSize; ++row) {
-    walk.begin_row(row);
-    Floats row_x{}, row_y{};
-#pragma GCC unroll 2
-    for (int group = 0; group < kGroups; ++group) {
-      const int at = row * kSize + 8 * group;
-      const Floats pixels = walk.take(group) - mean;
-      photometry.add(pixels, load<Floats>(patch.value.data() + at));
-      const Floats product_x = load<Floats>(patch.gradient_x.data() + at) * pixels;
-      const Floats product_y = load<Floats>(patch.gradient_y.data() + at) * pixels;
-      x[group] += product_x;
-      y[group] += product_y;
-      row_x += product_x;
-      row_y += product_y;
-    }
-    x_y += row_x * offset(row);
-    y_y += row_y * offset(row);
+    const Words pixels = less(walk.take(row), mean);
+    const auto gradient_x = load<Words>(patch.gradient_x.data() + row * kSize);
+    const auto gradient_y = load<Words>(patch.gradient_y.data() + row * kSize);
+    photometry.add(pixels, load<Words>(patch.value.data() + row * kSize));
+    x += dot(pixels, gradient_x);
+    y += dot(pixels, gradient_y);
+    x_above += x;
+    y_above += y;
+    const Words weighted = pixels * from_middle;
+    x_x += dot(weighted, gradient_x);
+    y_x += dot(weighted, gradient_y);
   }
   photometry.put(sums);
-  sums.x = grey(x[0] + x[1]);
-  sums.y = grey(y[0] + y[1]);
-  sums.x_x = grey(x[0] * offsets(0) + x[1] * offsets(1));
-  sums.y_x = grey(y[0] * offsets(0) + y[1] * offsets(1));
-  sums.x_y = grey(x_y);
-  sums.y_y = grey(y_y);
+  sums.x = grey(x, kGradientProduct);
+  sums.y = grey(y, kGradientProduct);
+  sums.x_x = grey(x_x, kGradientProduct) - 0.5F * sums.x;
+  sums.y_x = grey(y_x, kGradientProduct) - 0.5F * sums.y;
+  constexpr float kRows = static_cast<float>(kSize) - kPatchHalf;
+  sums.x_y = kRows * sums.x - grey(x_above, kGradientProduct);
+  sums.y_y = kRows * sums.y - grey(y_above, kGradientProduct);
 }
 
 void compare(const GreyLevel& level, const PatchPlace& place, const PatchPixels& patch, AlignmentSums& sums) {
-  Walk walk(level, place, kSkip);
-  const float mean = patch.mean * kUnit;
+  const Walk walk(level, place, kSkip, kSize - 2 * kSkip);
+  const Words mean = level_of(patch);
   Photometry photometry;
-  for (int row = kSkip; row < kSize - kSkip; ++row) {
-    walk.begin_row(row);
-#pragma GCC unroll 2
-    for (int group = 0; group < kGroups; ++group) {
-      photometry.add(walk.take(group) - mean, load<Floats>(patch.value.data() + row * kSize + 8 * group));
-    }
+  for (int row = 0; row < kSize - 2 * kSkip; ++row) {
+    photometry.add(less(walk.take(row), mean), load<Words>(patch.value.data() + (kSkip + row) * kSize));
   }
   photometry.put(sums);
 }
 
-// First derivative. Five taps: with three, fine texture looks flatter than it is, and every step overshoots.
-inline Floats derivative(const Floats& before2, const Floats& before, const Floats& after, const Floats& after2) {
-  return ((after - before) * 8.0F - (after2 - before2)) * (1.0F / 12.0F);
+// What compare() gives at places one column of the patch apart, from pixels that are taken once.
+void compare_along(const GreyLevel& level, const PatchPlace& place, const PatchPixels& patch,
+                   std::array<AlignmentSums, kPatchSize>& sums) {
+  constexpr int kRows = kSize - 2 * kSkip;
+  constexpr float kColumns = static_cast<float>(kSize);
+  const PatchPlace further{
+      {place.centre[0] + kColumns * place.column_x[0], place.centre[1] + kColumns * place.column_x[1]},
+      place.column_x,
+      place.column_y,
+      place.perspective};
+  const Walk first(level, place, kSkip, kRows);
+  const Walk second(level, further, kSkip, kRows);
+  const Words mean = level_of(patch);
+  alignas(32) std::int16_t strip[kRows][2 * kSize];
+  alignas(32) std::int16_t total[2 * kSize];  // of the columns, 32640 at most
+  Words total_first = spread(0), total_second = spread(0);
+  for (int row = 0; row < kRows; ++row) {
+    const Words pixels = less(first.take(row), mean);
+    const Words next = less(second.take(row), mean);
+    store(strip[row], pixels);
+    store(strip[row] + kSize, next);
+    total_first = total_first + pixels;
+    total_second = total_second + next;
+  }
+  store(total, total_first);
+  store(total + kSize, total_second);
+  for (int at = 0; at < kSize; ++at) {
+    Photometry photometry;
+    photometry.image = dot(load<Words>(total + at), spread(1));
+    for (int row = 0; row < kRows; ++row) {
+      const auto pixels = load<Words>(strip[row] + at);
+      photometry.image2 += dot(pixels, pixels);
+      photometry.product += dot(pixels, load<Words>(patch.value.data() + (kSkip + row) * kSize));
+    }
+    photometry.put(sums[static_cast<std::size_t>(at)]);
+  }
+}
+
+// First derivative of what has kBetweenBits, in kGradientUnit. Five taps: with three, fine texture looks flatter than
+// it is, and every step overshoots.
+inline Words derivative(const Words& before2, const Words& before, const Words& after, const Words& after2) {
+  static_assert(kBetweenBits == 6 && 8.0F * kGradientUnit == 1.0F, "(8 (after - before) - (after2 - before2)) / 96");
+  return multiply_high((after - before) - ((after2 - before2) >> 3) + word(6), spread(word((1 << 16) / 12)));
 }
 
 void capture(const GreyLevel& level, const std::array<float, 2>& centre, PatchPixels& patch) {
   constexpr int kReach = 2;  // of the derivative
   constexpr int kWide = kSize + 2 * kReach;
-  constexpr int kRow = 24;  // kWide, in eights
-  alignas(32) float wide[kWide * kRow];
+  constexpr int kRow = 2 * kSize;  // kWide, in sixteens
+  alignas(32) std::int16_t wide[kWide][kRow];
   const int x = to_fixed(centre[0] - kPatchHalf - static_cast<float>(kReach) + static_cast<float>(kOffset));
   const int y = to_fixed(centre[1] - kPatchHalf - static_cast<float>(kReach) + static_cast<float>(kOffset));
   const std::uint8_t* corner =
       level.origin + ((y >> kFixedBits) - kOffset) * level.stride + ((x >> kFixedBits) - kOffset);
-  const float weight_x = static_cast<float>(x & (kFixedOne - 1)) * (1.0F / static_cast<float>(kFixedOne));
-  const float weight_y = static_cast<float>(y & (kFixedOne - 1)) * (1.0F / static_cast<float>(kFixedOne));
-  for (int row = 0; row < kWide; ++row, corner += level.stride) {
-    float* const out = wide + row * kRow;
-    const std::uint8_t* const below = corner + level.stride;
-    for (int i = 0; i < kRow; ++i) {  // in eights; the last four are not looked at
-      const auto top = static_cast<float>(corner[i]);
-      const auto bottom = static_cast<float>(below[i]);
-      const float left = top + weight_x * (static_cast<float>(corner[i + 1]) - top);
-      const float right = bottom + weight_x * (static_cast<float>(below[i + 1]) - bottom);
-      out[i] = left + weight_y * (right - left);
+  const Words across = spread(word((x & (kFixedOne - 1)) >> 1));
+  const Words down = spread(word((y & (kFixedOne - 1)) >> 1));
+  for (int from = 0; from < kRow; from += kSize) {
+    Words above = between(words_at(corner + from), words_at(corner + from + 1), across);
+    for (int row = 0; row < kWide; ++row) {
+      const std::uint8_t* const next = corner + (row + 1) * level.stride + from;
+      const Words below = between(words_at(next), words_at(next + 1), across);
+      store(wide[row] + from, above + multiply_high((below - above) << 1, down));
+      above = below;
     }
   }
-  Floats total{};
+  Ints total{};
   for (int row = 0; row < kSize; ++row) {
-    for (int group = 0; group < kGroups; ++group) {
-      const float* const in = wide + (row + kReach) * kRow + kReach + 8 * group;
-      const int at = row * kSize + 8 * group;
-      const Floats pixels = load<Floats>(in);
-      total += pixels;
-      store(patch.value.data() + at, pixels);
-      store(patch.gradient_x.data() + at,
-            derivative(load<Floats>(in - 2), load<Floats>(in - 1), load<Floats>(in + 1), load<Floats>(in + 2)));
-      store(patch.gradient_y.data() + at, derivative(load<Floats>(in - 2 * kRow), load<Floats>(in - kRow),
-                                                     load<Floats>(in + kRow), load<Floats>(in + 2 * kRow)));
-    }
+    total += dot(load<Words>(wide[row + kReach] + kReach), spread(1));
   }
-  patch.mean = sum(total) * (1.0F / static_cast<float>(kPatchPixels));
-  for (int at = 0; at < kPatchPixels; at += 8) {
-    store(patch.value.data() + at, load<Floats>(patch.value.data() + at) - patch.mean);
+  constexpr float kOne = static_cast<float>(1 << kBetweenBits);
+  const float mean = sum(to_floats(total)) * (1.0F / static_cast<float>(kPatchPixels));
+  patch.mean = mean * (1.0F / kOne);
+  const Words less_mean = spread(word(static_cast<int>(mean + 0.5F) - 2));  // to the next, when two bits are cut off
+  for (int row = 0; row < kSize; ++row) {
+    const std::int16_t* const in = wide[row + kReach] + kReach;
+    const auto at = [&](int further) { return load<Words>(in + further); };
+    store(patch.value.data() + row * kSize, less(at(0), less_mean));
+    store(patch.gradient_x.data() + row * kSize, derivative(at(-2), at(-1), at(1), at(2)));
+    store(patch.gradient_y.data() + row * kSize, derivative(at(-2 * kRow), at(-kRow), at(kRow), at(2 * kRow)));
   }
 }
 
@@ -321,21 +465,21 @@ struct ColumnSums {  // without y^2
   }
 };
 
-inline void put(const ColumnMoments (&columns)[kGroups], Moments& out) {
+inline void put(const ColumnMoments (&columns)[kGroups], float unit, Moments& out) {
   const Floats x0 = columns[0].one * offsets(0);
   const Floats x1 = columns[1].one * offsets(1);
-  out.one = sum(columns[0].one + columns[1].one);
-  out.x = sum(x0 + x1);
-  out.y = sum(columns[0].y + columns[1].y);
-  out.xx = sum(x0 * offsets(0) + x1 * offsets(1));
-  out.xy = sum(columns[0].y * offsets(0) + columns[1].y * offsets(1));
-  out.yy = sum(columns[0].yy + columns[1].yy);
+  out.one = sum(columns[0].one + columns[1].one) * unit;
+  out.x = sum(x0 + x1) * unit;
+  out.y = sum(columns[0].y + columns[1].y) * unit;
+  out.xx = sum(x0 * offsets(0) + x1 * offsets(1)) * unit;
+  out.xy = sum(columns[0].y * offsets(0) + columns[1].y * offsets(1)) * unit;
+  out.yy = sum(columns[0].yy + columns[1].yy) * unit;
 }
 
-inline void put(const ColumnSums (&columns)[kGroups], Moments& out) {
-  out.one = sum(columns[0].one + columns[1].one);
-  out.x = sum(columns[0].one * offsets(0) + columns[1].one * offsets(1));
-  out.y = sum(columns[0].y + columns[1].y);
+inline void put(const ColumnSums (&columns)[kGroups], float unit, Moments& out) {
+  out.one = sum(columns[0].one + columns[1].one) * unit;
+  out.x = sum(columns[0].one * offsets(0) + columns[1].one * offsets(1)) * unit;
+  out.y = sum(columns[0].y + columns[1].y) * unit;
 }
 
 void moments(const PatchPixels& patch, PatchMoments& out) {
@@ -345,9 +489,9 @@ void moments(const PatchPixels& patch, PatchMoments& out) {
   for (int group = 0; group < kGroups; ++group) {
     for (int row = 0; row < kSize; ++row) {
       const int at = row * kSize + 8 * group;
-      const Floats x = load<Floats>(patch.gradient_x.data() + at);
-      const Floats y = load<Floats>(patch.gradient_y.data() + at);
-      const Floats value = load<Floats>(patch.value.data() + at);
+      const Floats x = floats_at(patch.gradient_x.data() + at);
+      const Floats y = floats_at(patch.gradient_y.data() + at);
+      const Floats value = floats_at(patch.value.data() + at);
       const float offset_y = offset(row);
       gx_gx[group].add(x * x, offset_y);
       gx_gy[group].add(x * y, offset_y);
@@ -362,36 +506,94 @@ void moments(const PatchPixels& patch, PatchMoments& out) {
       middle2 += value * value;
     }
   }
-  put(gx_gx, out.gx_gx);
-  put(gx_gy, out.gx_gy);
-  put(gy_gy, out.gy_gy);
-  put(gx, out.gx);
-  put(gy, out.gy);
-  put(gx_value, out.gx_value);
-  put(gy_value, out.gy_value);
-  out.energy = sum(energy);
-  out.middle = sum(middle);
-  out.middle2 = sum(middle2);
+  put(gx_gx, kGradientUnit * kGradientUnit, out.gx_gx);
+  put(gx_gy, kGradientUnit * kGradientUnit, out.gx_gy);
+  put(gy_gy, kGradientUnit * kGradientUnit, out.gy_gy);
+  put(gx, kGradientUnit, out.gx);
+  put(gy, kGradientUnit, out.gy);
+  put(gx_value, kGradientProduct, out.gx_value);
+  put(gy_value, kGradientProduct, out.gy_value);
+  out.energy = sum(energy) * (kPatchUnit * kPatchUnit);
+  out.middle = sum(middle) * kPatchUnit;
+  out.middle2 = sum(middle2) * (kPatchUnit * kPatchUnit);
 }
 
-void halve_row(const std::array<const std::uint8_t*, 5>& rows, int width, std::uint16_t* sums, std::uint8_t* out) {
+void position_moments(const PatchPixels& patch, PatchMoments& out) {
+  Ints gx_gx{}, gx_gy{}, gy_gy{}, gx{}, gy{}, gx_value{}, gy_value{}, energy{}, middle{}, middle2{};
+  for (int row = 0; row < kSize; ++row) {
+    const auto x = load<Words>(patch.gradient_x.data() + row * kSize);
+    const auto y = load<Words>(patch.gradient_y.data() + row * kSize);
+    const auto value = load<Words>(patch.value.data() + row * kSize);
+    const Ints value2 = dot(value, value);
+    gx_gx += dot(x, x);
+    gx_gy += dot(x, y);
+    gy_gy += dot(y, y);
+    gx += dot(x, spread(1));
+    gy += dot(y, spread(1));
+    gx_value += dot(x, value);
+    gy_value += dot(y, value);
+    energy += value2;
+    if (row < kSkip || row >= kSize - kSkip) continue;
+    middle += dot(value, spread(1));
+    middle2 += value2;
+  }
+  out.gx_gx.one = grey(gx_gx, kGradientUnit * kGradientUnit);
+  out.gx_gy.one = grey(gx_gy, kGradientUnit * kGradientUnit);
+  out.gy_gy.one = grey(gy_gy, kGradientUnit * kGradientUnit);
+  out.gx.one = grey(gx, kGradientUnit);
+  out.gy.one = grey(gy, kGradientUnit);
+  out.gx_value.one = grey(gx_value, kGradientProduct);
+  out.gy_value.one = grey(gy_value, kGradientProduct);
+  out.energy = grey(energy, kPatchUnit * kPatchUnit);
+  out.middle = grey(middle, kPatchUnit);
+  out.middle2 = grey(middle2, kPatchUnit * kPatchUnit);
+}
+
+void halve_row(const std::array<const std::uint8_t*, 5>& rows, int width, std::int16_t* sums, std::uint8_t* out) {
   constexpr int kReach = 2;
-  const std::uint8_t* const a = rows[0] - kReach;
-  const std::uint8_t* const b = rows[1] - kReach;
-  const std::uint8_t* const c = rows[2] - kReach;
-  const std::uint8_t* const d = rows[3] - kReach;
-  const std::uint8_t* const e = rows[4] - kReach;
-  const int columns = 2 * width + 2 * kReach;
-  for (int i = 0; i < columns; ++i) {
-    sums[i] = static_cast<std::uint16_t>(a[i] + e[i] + 4 * (b[i] + d[i]) + 6 * c[i]);
+  // Factors of neighbours.
+  alignas(32) constexpr std::int16_t kFirst[16] = {1, 4, 1, 4, 1, 4, 1, 4, 1, 4, 1, 4, 1, 4, 1, 4};
+  alignas(32) constexpr std::int16_t kSecond[16] = {6, 4, 6, 4, 6, 4, 6, 4, 6, 4, 6, 4, 6, 4, 6, 4};
+  alignas(32) constexpr std::int16_t kThird[16] = {1, 0, 1, 0, 1, 0, 1, 0, 1, 0, 1, 0, 1, 0, 1, 0};
+  const auto pairs = [](const std::int16_t* p, const std::int16_t* factors) {
+    return dot(load<Words>(p), load<Words>(factors));
+  };
+  for (int i = 0; i < 2 * width + 2 * kReach; i += 16) {
+    const auto row = [&](std::size_t k) { return words_at(rows[k] - kReach + i); };
+    const Words middle = row(2);
+    store(sums + i, (row(0) + row(4)) + ((row(1) + row(3) + middle) << 2) + (middle << 1));
   }
-  for (int i = columns; i < columns + 16; ++i) sums[i] = 0;  // of pixels that nobody looks at
-  for (int i = 0; i < width; i += 8) {                       // in pairs of neighbours
-    const Ints first = add_products(load<Ints>(sums + 2 * i), all(1 | (4 << 16)));
-    const Ints second = add_products(load<Ints>(sums + 2 * i + 2), all(6 | (4 << 16)));
-    const Ints third = add_products(load<Ints>(sums + 2 * i + 4), all(1));
-    store_bytes(out + i, (first + second + third + 128) >> 8);
+  for (int i = 0; i < width; i += 16) {
+    const auto eight = [&](const std::int16_t* p) {
+      return (pairs(p, kFirst) + pairs(p + 2, kSecond) + pairs(p + 4, kThird) + 128) >> 8;
+    };
+    store_bytes(out + i, eight(sums + 2 * i), eight(sums + 2 * i + 16));
   }
+}
+
+alignas(32) constexpr std::int16_t kAllButLast[16] = {-1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, 0};
+
+void texture(const std::uint8_t* middle, std::ptrdiff_t stride, TextureSums& out) {
+  constexpr int kReach = 7;
+  const Words counts = load<Words>(kAllButLast);
+  Ints across2{}, down2{}, across_down{}, right2{}, below2{};
+  for (int row = -kReach; row <= kReach; ++row) {
+    const std::uint8_t* const p = middle + row * stride - kReach;
+    const Words here = words_at(p);
+    const Words next = words_at(p + 1);
+    const Words under = words_at(p + stride);
+    const Words across = (next - words_at(p - 1)) & counts;
+    const Words down = (under - words_at(p - stride)) & counts;
+    const Words right = (next - here) & counts;
+    const Words below = (under - here) & counts;
+    across2 += dot(across, across);
+    down2 += dot(down, down);
+    across_down += dot(across, down);
+    right2 += dot(right, right);
+    below2 += dot(below, below);
+  }
+  const auto whole = [](const Ints& sums) { return static_cast<int>(sum(to_floats(sums))); };  // below 2^24: exact
+  out = {whole(across2), whole(down2), whole(across_down), whole(right2), whole(below2)};
 }
 
 constexpr int kBlock = 32;  // pixels at a time
@@ -414,12 +616,35 @@ inline void add_arcs(const Block (&circle)[16], Block& best) {
   }
 }
 
-void corner_scores(const std::uint8_t* row, std::ptrdiff_t stride, int width, std::uint8_t* scores) {
+// What no score of these pixels exceeds: an arc of nine holds two neighbours of the four pixels straight above, below,
+// left and right.
+inline std::uint8_t most_of(const std::uint8_t* centre, std::ptrdiff_t stride) {
+  Block most;
+  for (int i = 0; i < kBlock; ++i) {
+    const std::uint8_t* const p = centre + i;
+    const std::uint8_t upright_high = greater(p[-3 * stride], p[3 * stride]);
+    const std::uint8_t upright_low = lesser(p[-3 * stride], p[3 * stride]);
+    const std::uint8_t level_high = greater(p[-3], p[3]);
+    const std::uint8_t level_low = lesser(p[-3], p[3]);
+    const std::uint8_t high = greater(lesser(upright_high, level_high), p[0]);
+    const std::uint8_t low = lesser(greater(upright_low, level_low), p[0]);
+    most[i] = greater(static_cast<std::uint8_t>(high - p[0]), static_cast<std::uint8_t>(p[0] - low));
+  }
+  std::uint8_t largest = 0;
+  for (int i = 0; i < kBlock; ++i) largest = greater(largest, most[i]);
+  return largest;
+}
+
+void corner_scores(const std::uint8_t* row, std::ptrdiff_t stride, int width, int threshold, std::uint8_t* scores) {
   constexpr int kAcross[16] = {0, 1, 2, 3, 3, 3, 2, 1, 0, -1, -2, -3, -3, -3, -2, -1};
   constexpr int kDown[16] = {3, 3, 2, 1, 0, -1, -2, -3, -3, -3, -2, -1, 0, 1, 2, 3};
   for (int from = 0; from < width; from += kBlock) {
     alignas(32) Block brighter[16], darker[16], best = {};
     const std::uint8_t* const centre = row + from;
+    if (most_of(centre, stride) <= threshold) {
+      std::memset(scores + from, 0, kBlock);
+      continue;
+    }
     for (int k = 0; k < 16; ++k) {
       const std::uint8_t* const p = centre + kDown[k] * stride + kAcross[k];
       for (int i = 0; i < kBlock; ++i) {

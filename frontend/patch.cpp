@@ -78,8 +78,8 @@ bool PatchLevel::capture(const ImageKernels& kernels, const GreyLevel& level, co
 }
 
 bool PatchLevel::solve_normal_equations(const ImageKernels& kernels, bool affine) {
-  PatchMoments moments;
-  kernels.moments(pixels_, moments);
+  PatchMoments moments{};
+  (affine ? kernels.moments : kernels.position_moments)(pixels_, moments);
   energy_ = moments.energy;
   if (!(energy_ > 0.0F)) return false;
   constexpr float kInverseMiddle = 2.0F / static_cast<float>(kPatchPixels);
@@ -174,15 +174,35 @@ std::optional<PatchLevel::Step> PatchLevel::step_affine(const ImageKernels& kern
   return Step{p.correlation, moved, chi2};
 }
 
-std::optional<float> PatchLevel::correlate(const ImageKernels& kernels, const GreyLevel& level,
-                                           const Warp& warp) const {
+float PatchLevel::correlation(const AlignmentSums& sums) const {
   constexpr float kInverseCount = 2.0F / static_cast<float>(kPatchPixels);  // half of the rows
-  if (!inside(level, warp, kPatchHalf)) return std::nullopt;
-  AlignmentSums sums;
-  kernels.compare(level, place_of(warp), pixels_, sums);
   const float covariance = sums.product - sums.image * middle_ * kInverseCount;
   const float variances = (sums.image2 - sums.image * sums.image * kInverseCount) * middle_variance_;
   return variances > 0.0F ? covariance / std::sqrt(variances) : 0.0F;
+}
+
+std::optional<float> PatchLevel::correlate(const ImageKernels& kernels, const GreyLevel& level,
+                                           const Warp& warp) const {
+  if (!inside(level, warp, kPatchHalf)) return std::nullopt;
+  AlignmentSums sums;
+  kernels.compare(level, place_of(warp), pixels_, sums);
+  return correlation(sums);
+}
+
+std::optional<std::array<float, kPatchSize>> PatchLevel::correlate_along(const ImageKernels& kernels,
+                                                                         const GreyLevel& level,
+                                                                         const Warp& warp) const {
+  constexpr float kMaxBent = 0.25F;  // [px] of the patch's corners by the perspective
+  if (2.0F * kPatchHalf * kPatchHalf * warp.perspective.cwiseAbs().sum() > kMaxBent) return std::nullopt;
+  const Warp flat{warp.centre, warp.affine};
+  Warp last = flat;
+  last.centre += static_cast<float>(kPatchSize) * warp.affine.col(0);
+  if (!inside(level, flat, kPatchHalf) || !inside(level, last, kPatchHalf)) return std::nullopt;
+  std::array<AlignmentSums, kPatchSize> sums;
+  kernels.compare_along(level, place_of(flat), pixels_, sums);
+  std::array<float, kPatchSize> correlations;
+  for (std::size_t i = 0; i < sums.size(); ++i) correlations[i] = correlation(sums[i]);
+  return correlations;
 }
 
 }  // namespace ear

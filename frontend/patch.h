@@ -5,6 +5,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <limits>
 #include <optional>
 
@@ -63,7 +64,15 @@ class PatchLevel {
   [[nodiscard]] std::optional<float> correlate(const ImageKernels& kernels, const GreyLevel& level,
                                                const Warp& warp) const;
 
+  /// correlate() at sixteen places: `warp`'s centre, and one column of the patch further each time, without its
+  /// perspective. Nothing if the patch leaves the image at one of them, or the perspective matters.
+  [[nodiscard]] std::optional<std::array<float, kPatchSize>> correlate_along(const ImageKernels& kernels,
+                                                                             const GreyLevel& level,
+                                                                             const Warp& warp) const;
+
  private:
+  [[nodiscard]] float correlation(const AlignmentSums& sums) const;  // over the rows that correlate() compares
+
   using Vector6f = Eigen::Matrix<float, 6, 1>;
   using Matrix6f = Eigen::Matrix<float, 6, 6>;
 

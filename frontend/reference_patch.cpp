@@ -91,6 +91,15 @@ std::optional<float> ReferencePatch::correlate(const ImagePyramid& pyramid, cons
   return levels_[i].correlate(pyramid.kernels(), level_under(pyramid, level, coarse), coarse);
 }
 
+std::optional<std::array<float, kPatchSize>> ReferencePatch::correlate_along(const ImagePyramid& pyramid,
+                                                                             const Warp& warp, int level) const {
+  const auto i = static_cast<std::size_t>(level);
+  if (!usable_[i]) return std::nullopt;
+  const Warp coarse = scaled(warp, level);
+  const float fall = std::abs(static_cast<float>(kPatchSize) * coarse.affine(1, 0));  // of the row
+  return levels_[i].correlate_along(pyramid.kernels(), level_under(pyramid, level, coarse, kPatchHalf + fall), coarse);
+}
+
 std::optional<ReferencePatch::Match> ReferencePatch::align(const ImagePyramid& pyramid, const Warp& start,
                                                            int start_level) const {
   Warp warp = start;

@@ -29,6 +29,10 @@ class ReferencePatch {
   /// See PatchLevel::correlate, on one level at a fixed place; nothing if the level is unusable or the patch leaves it.
   [[nodiscard]] std::optional<float> correlate(const ImagePyramid& pyramid, const Warp& warp, int level) const;
 
+  /// See PatchLevel::correlate_along, likewise.
+  [[nodiscard]] std::optional<std::array<float, kPatchSize>> correlate_along(const ImagePyramid& pyramid,
+                                                                             const Warp& warp, int level) const;
+
   /// See PatchLevel::corner_strength, base level.
   [[nodiscard]] float corner_strength() const { return levels_.front().corner_strength(); }
 

@@ -12,6 +12,7 @@ namespace {
 constexpr int kSearchLevel = StereoMatcher::kLevels - 1;
 constexpr int kRefineLevel = 1;
 constexpr double kSearchStepPx = 4.0;          // on the base image: one pixel of the search level
+constexpr double kMaxOffLinePx = 3.0;          // of sixteen steps along a row of the patch, from first to last
 constexpr double kMaxDisparityShare = 0.2;     // of the image's width
 constexpr float kMinSearchCorrelation = 0.5F;  // on the search level
 constexpr float kRivalMargin = 0.1F;           // a second peak this close to the first is looked at as well
@@ -132,6 +133,26 @@ std::optional<StereoMatch> StereoMatcher::follow(const ImagePyramid& right, cons
   return accepted;
 }
 
+std::optional<StereoMatcher::Columns> StereoMatcher::columns_from(const Eigen::Vector2d& left, double inverse_depth,
+                                                                  const Warp& warp, const Eigen::Vector2d& aside,
+                                                                  int level) const {
+  Eigen::Vector2d column = static_cast<double>(1 << level) * warp.affine.col(0).cast<double>();
+  const double length = kPatchSize * column.norm();
+  const auto first = project(left, inverse_depth);
+  const auto ahead = project(left, inverse_depth + length * inverse_depth_per_pixel_);
+  if (!first || !ahead || *ahead == *first) return std::nullopt;
+  const double step = length * inverse_depth_per_pixel_ * length / ((*ahead - *first).norm() * kPatchSize);
+  const auto last = project(left, inverse_depth + kPatchSize * step);  // the lens compresses what is far off its axis
+  if (!last) return std::nullopt;
+  const bool backwards = column.dot(*last - *first) < 0.0;
+  if (backwards) column = -column;
+  const Eigen::Vector2d off = *last - (*first + kPatchSize * column);
+  const double along = off.dot(column) / column.norm();
+  const double across2 = off.squaredNorm() - along * along;
+  if (std::abs(along) > kSearchStepPx || across2 > kMaxOffLinePx * kMaxOffLinePx) return std::nullopt;
+  return Columns{*first + 0.5 * off + aside, column, step, backwards};
+}
+
 std::optional<StereoMatch> StereoMatcher::search(const ImagePyramid& right, const ReferencePatch& patch,
                                                  const Warp& left_warp, const Eigen::Vector2d& left) const {
   // How a surface patch that faces the camera looks hardly depends on its depth; take it halfway.
@@ -148,12 +169,23 @@ std::optional<StereoMatch> StereoMatcher::search(const ImagePyramid& right, cons
   Peaks<Hypothesis> peaks;
   const double step = kSearchStepPx * inverse_depth_per_pixel_;
   const auto along_line = [&](const Eigen::Vector2d& aside) {
-    for (double inverse_depth = 0.0; inverse_depth <= max_inverse_depth_; inverse_depth += step) {
-      const auto pixel = project(left, inverse_depth);
-      if (!pixel) continue;
-      const Eigen::Vector2d beside = *pixel + aside;
-      const auto correlation = patch.correlate(right, at(beside), level);
-      if (correlation) peaks.add({beside, *correlation});
+    double inverse_depth = 0.0;
+    while (inverse_depth <= max_inverse_depth_) {
+      if (const auto columns = columns_from(left, inverse_depth, *carried, aside, level)) {
+        if (const auto correlations = patch.correlate_along(right, at(columns->lowest()), level)) {
+          for (int i = 0; i < kPatchSize && inverse_depth <= max_inverse_depth_; ++i, inverse_depth += columns->step) {
+            peaks.add({columns->place(i), (*correlations)[columns->number(i)]});
+          }
+          continue;
+        }
+      }
+      for (int i = 0; i < kPatchSize && inverse_depth <= max_inverse_depth_; ++i, inverse_depth += step) {
+        const auto pixel = project(left, inverse_depth);
+        if (!pixel) continue;
+        const Eigen::Vector2d beside = *pixel + aside;
+        const auto correlation = patch.correlate(right, at(beside), level);
+        if (correlation) peaks.add({beside, *correlation});
+      }
     }
     peaks.end();
   };

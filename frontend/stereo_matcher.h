@@ -46,6 +46,24 @@ class StereoMatcher {
     float correlation = -1.0F;
   };
 
+  /// Steps of a search that follow the patch's rows, one of its columns on the level each.
+  struct Columns {
+    Eigen::Vector2d first;   ///< [px]
+    Eigen::Vector2d column;  ///< to the next [px]
+    double step;             ///< of inverse depth [1/m]
+    bool backwards;          ///< against the order of the columns
+
+    [[nodiscard]] Eigen::Vector2d place(int index) const { return first + index * column; }
+    [[nodiscard]] Eigen::Vector2d lowest() const { return backwards ? place(kPatchSize - 1) : first; }
+    [[nodiscard]] std::size_t number(int index) const {  ///< from the lowest
+      return static_cast<std::size_t>(backwards ? kPatchSize - 1 - index : index);
+    }
+  };
+
+  /// Sixteen, from `inverse_depth` on; nothing where the epipolar line leads elsewhere.
+  [[nodiscard]] std::optional<Columns> columns_from(const Eigen::Vector2d& left, double inverse_depth, const Warp& warp,
+                                                    const Eigen::Vector2d& aside, int level) const;
+
   [[nodiscard]] std::optional<Eigen::Vector2d> project(const Eigen::Vector2d& left, double inverse_depth) const;
   [[nodiscard]] std::optional<StereoMatch> accept(const ReferencePatch::Match& match, const Warp& start,
                                                   const Warp& left_warp, const Eigen::Vector2d& left,
