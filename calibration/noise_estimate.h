@@ -18,8 +18,8 @@ struct WheelDifference {
   double way = 0.0;    ///< of both wheels together [m]
 };
 
-/// The slip [m/sqrt(m)] of one wheel that is likeliest beside what is known: errors of variance known + slip^2 way. They
-/// count up to two standard deviations. 0 where encoders and gyroscope explain all.
+/// The slip [m/sqrt(m)] of one wheel that is likeliest beside what is known: errors of variance known + slip^2 way.
+/// They count up to two standard deviations. 0 where encoders and gyroscope explain all.
 [[nodiscard]] double slip_walk(const std::vector<WheelDifference>& differences);
 
 /// The same of a drive, against the gyroscope. Nothing where the wheels hardly turned.
