@@ -73,10 +73,10 @@ the position is far off. "none": no estimate, with a reason in words; empty: the
 
 REFERENCES = """## How good the truths are
 
-`tools/real_data references` judges each truth by the recording's own inertial samples and by itself; no estimate is in it. How much turns over a second differ
-from the gyroscope's, its bias taken out; by how much the positions and the truth's own velocities contradict each other over the worst second; by how much
-later the positions are than the accelerometer, integrated twice over 0.3 s with gravity, bias and a lever fitted, and what is then left. `hop` is simulated: its
-row shows what the inertial samples' noise does. "-": no velocities, or gaps. What it means for the figures above:
+`tools/real_data references` judges each truth by the recording's own inertial samples and by itself; no estimate is in it. How much turns over a second
+differ from the gyroscope's, its bias taken out; by how much the positions and the truth's own velocities contradict each other over the worst second; by how
+much later the positions are than the accelerometer, integrated twice over 0.3 s with gravity, bias and a lever fitted, and what is then left. `hop` is
+simulated: its row shows what the inertial samples' noise does. "-": no velocities, or gaps. What it means for the figures above:
 [decision 31](decisions/0031-priors-as-real-sensors-are.md).
 """
 
