@@ -46,8 +46,6 @@ inline void store_bytes(std::uint8_t* p, Ints numbers) {
   _mm_storel_epi64(reinterpret_cast<__m128i*>(p), _mm_packus_epi16(words, words));
 }
 
-#define EAR_HAS_PICK 1
-
 #else
 
 using Floats4 = float __attribute__((vector_size(16)));
@@ -123,12 +121,6 @@ inline void store_bytes(std::uint8_t* p, const Ints& numbers) {
   }
 #endif
 }
-
-#if defined(__SSSE3__) || defined(__aarch64__)
-#define EAR_HAS_PICK 1
-#else
-#define EAR_HAS_PICK 0
-#endif
 
 #endif  // __AVX2__
 

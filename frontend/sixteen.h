@@ -4,6 +4,12 @@
 
 #include "frontend/eight.h"
 
+#if defined(__SSSE3__) || defined(__aarch64__)  // AVX2 has it, too
+#define EAR_HAS_PICK 1
+#else
+#define EAR_HAS_PICK 0
+#endif
+
 namespace ear::EAR_VARIANT {
 
 using Eight16 = std::int16_t __attribute__((vector_size(16)));

@@ -8,7 +8,7 @@ truth breaks this, an estimate is told an error that is the truth's.
 import bisect
 import math
 
-from real.layout import BadInput, read_lines, read_numbers
+from real.layout import BadInput, matrix, multiply, read_lines, read_numbers, rotate, transpose
 
 WINDOW = 0.3  # [s] of the second difference: noise of the accelerometer does not count yet, that of positions does
 STEP = 0.05  # [s] from one second difference to the next
@@ -17,24 +17,8 @@ SPAN = 1.0  # [s] over which turns and velocities are compared
 LONGEST_GAP = 0.05  # [s] in the truth that is bridged
 
 
-def rotation(w, x, y, z):
-    n = math.sqrt(w * w + x * x + y * y + z * z)
-    w, x, y, z = w / n, x / n, y / n, z / n
-    return [[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]]
-
-
-def times(R, v):
-    return [sum(a * b for a, b in zip(row, v)) for row in R]
-
-
-def product(A, B):
-    return [[sum(A[i][k] * B[k][j] for k in range(3)) for j in range(3)] for i in range(3)]
-
-
-def transposed(R):
-    return [list(column) for column in zip(*R)]
+def unit(q):
+    return [x / math.hypot(*q) for x in q]
 
 
 def vector_of(R):
@@ -51,7 +35,7 @@ def turned(R, v):
     if angle < 1e-12:
         return R
     s = math.sin(angle / 2) / angle
-    return product(R, rotation(math.cos(angle / 2), *(s * a for a in v)))
+    return multiply(R, matrix(math.cos(angle / 2), *(s * a for a in v)))
 
 
 class Series:
@@ -83,14 +67,10 @@ def integrated(t, values):
 
 
 def solve(A, b):
-    """A x = b, symmetric and positive; nothing where it is singular."""
+    """A x = b, A symmetric and positive."""
     n = len(b)
-    rows = [list(A[i]) + [b[i]] for i in range(n)]
+    rows = [[*row, value] for row, value in zip(A, b)]
     for i in range(n):
-        pivot = max(range(i, n), key=lambda k: abs(rows[k][i]))
-        if abs(rows[pivot][i]) < 1e-12:
-            return None
-        rows[i], rows[pivot] = rows[pivot], rows[i]
         for k in range(i + 1, n):
             factor = rows[k][i] / rows[i][i]
             rows[k] = [a - factor * c for a, c in zip(rows[k], rows[i])]
@@ -106,7 +86,7 @@ class Truth:
     def __init__(self, rows, imu):
         zero = rows[0][0]
         self.t = [1e-9 * (t - zero) for t, _ in rows]
-        self.R = [rotation(*values[3:7]) for _, values in rows]
+        self.R = [matrix(*unit(values[3:7])) for _, values in rows]
         self.p = Series(self.t, [values[:3] for _, values in rows], LONGEST_GAP)
         has_velocity = len(rows[0][1]) >= 10 and any(any(values[7:10]) for _, values in rows)
         self.v = Series(self.t, integrated(self.t, [values[7:10] for _, values in rows])) if has_velocity else None
@@ -131,14 +111,14 @@ class Truth:
             now, end = self.t[i], self.t[j]
             span = end - now
             k = bisect.bisect_left(self.imu_t, now)
-            R = rotation(1.0, 0.0, 0.0, 0.0)
+            R = matrix(1.0, 0.0, 0.0, 0.0)
             while k < len(self.imu_t) and now < end:
                 until = min(self.imu_t[k], end)
                 middle = self.gyro_at((now + until) / 2, k)
                 R = turned(R, [(w - b) * (until - now) for w, b in zip(middle, bias)])
                 now, k = until, k + 1
             if span < 2 * SPAN:
-                difference = vector_of(product(transposed(R), product(transposed(self.R[i]), self.R[j])))
+                difference = vector_of(multiply(transpose(R), multiply(transpose(self.R[i]), self.R[j])))
                 differences.append([SPAN / span * a for a in difference])
             t += SPAN / 2
         return differences
@@ -173,7 +153,7 @@ class Truth:
         if len(inside) < 10:
             return None
         t = [self.imu_t[k] for k in inside]
-        a_W = [times(self.R_at(self.imu_t[k]), self.accel[k]) for k in inside]
+        a_W = [rotate(self.R_at(self.imu_t[k]), self.accel[k]) for k in inside]
         moved = Series(t, integrated(t, integrated(t, a_W)))
         axes = [Series(self.t, [[row[j] for row in R] for R in self.R]) for j in range(3)]
         samples = []
@@ -189,30 +169,22 @@ class Truth:
         if len(samples) < 30:
             return None
 
+        size = 9
+        A = [[1e-6 * (i == j) + sum(row[i] * row[j] for _, _, rows in samples for row in rows) for j in range(size)] for i in range(size)]
+
         def scatter(delay):
-            size = 9
-            A, b, squares = [[0.0] * size for _ in range(size)], [0.0] * size, 0.0
+            b, squares = [0.0] * size, 0.0
             for at, seen, rows in samples:
-                measured = moved.second_difference(at - delay)
-                for row, m, s in zip(rows, measured, seen):
-                    y = m - s
-                    squares += y * y
-                    for i, r in enumerate(row):
-                        b[i] += r * y
-                        for j in range(i, size):
-                            A[i][j] += r * row[j]
-            for i in range(size):
-                A[i][i] += 1e-6
-                for j in range(i):
-                    A[i][j] = A[j][i]
-            x = solve(A, b)
-            rest = squares - sum(a * c for a, c in zip(x, b))
+                for row, m, s in zip(rows, moved.second_difference(at - delay), seen):
+                    squares += (m - s) ** 2
+                    b = [total + r * (m - s) for total, r in zip(b, row)]
+            rest = squares - sum(a * c for a, c in zip(solve(A, b), b))
             return math.sqrt(max(rest, 0.0) / (3 * len(samples)) / 6.0)  # second difference: 1 + 4 + 1 variances
 
         steps = [1e-3 * k for k in range(-int(1e3 * LARGEST_DELAY), int(1e3 * LARGEST_DELAY) + 1, 4)]
-        best = min(steps, key=scatter)
-        best = min((best + 1e-3 * k for k in range(-3, 4)), key=scatter)
-        return best, scatter(best)
+        coarse = min(steps, key=scatter)
+        least, best = min((scatter(delay), delay) for delay in (coarse + 1e-3 * k for k in range(-3, 4)))
+        return best, least
 
 
 POSE = ["timestamp", "p_x", "p_y", "p_z", "q_w", "q_x", "q_y", "q_z"]
