@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "filter/ekf/propagation.h"
+#include "filter/ingest/silence.h"
 #include "filter/ingest/stamp_guard.h"
 #include "filter/sources/ground/ground_rows.h"
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "filter/ekf/so3.h"
-#include "filter/ingest/stamp_guard.h"
+#include "filter/ingest/silence.h"
 
 namespace ear {
 namespace {

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "filter/ingest/silence.h"
+
 namespace ear {
 namespace {
 

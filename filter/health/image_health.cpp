@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "filter/ingest/stamp_guard.h"
+#include "filter/ingest/silence.h"
 
 namespace ear {
 namespace {

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "filter/ingest/capacity.h"
+#include "filter/ingest/silence.h"
 #include "filter/ingest/stamp_guard.h"
 #include "filter/ingest/stream_clock.h"
 

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "filter/ingest/stamp_guard.h"
+#include "filter/ingest/silence.h"
 
 namespace ear {
 namespace {

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "filter/ingest/capacity.h"
+#include "filter/ingest/silence.h"
 
 namespace ear {
 namespace {

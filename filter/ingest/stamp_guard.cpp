@@ -1,5 +1,7 @@
 #include "filter/ingest/stamp_guard.h"
 
+#include "filter/ingest/silence.h"
+
 namespace ear {
 namespace {
 

@@ -5,7 +5,7 @@
 
 #include "filter/ekf/propagation.h"
 #include "filter/ekf/so3.h"
-#include "filter/ingest/stamp_guard.h"
+#include "filter/ingest/silence.h"
 #include "filter/start/start_fit.h"
 
 namespace ear {

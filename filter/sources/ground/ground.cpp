@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "filter/ekf/propagation.h"
-#include "filter/ingest/stamp_guard.h"
+#include "filter/ingest/silence.h"
 #include "filter/sources/ground/ground_rows.h"
 
 namespace ear {

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "filter/ekf/so3.h"
-#include "filter/ingest/stamp_guard.h"
+#include "filter/ingest/silence.h"
 
 namespace ear {
 namespace {

@@ -5,7 +5,7 @@
 
 #include "filter/ingest/capacity.h"
 #include "filter/ingest/median.h"
-#include "filter/ingest/stamp_guard.h"
+#include "filter/ingest/silence.h"
 
 namespace ear {
 namespace {

@@ -1,0 +1,23 @@
+// How long nothing may come, and what is too old to count: for samples, starts, sources and health alike.
+#pragma once
+
+#include <algorithm>
+
+namespace ear {
+
+/// [s] chosen: samples that do not come for so long are missing, and the stamp that follows needs to be confirmed.
+inline constexpr double kStreamGap = 0.25;
+/// [s] chosen: what a sensor showed so long ago shows nothing of now.
+inline constexpr double kStale = 0.5;
+/// [s] chosen: without inertial samples, or with nothing but these, for so long, and the state is lost.
+inline constexpr double kLostAfter = 2.0;
+/// Chosen: so many samples in a row confirm each other; one may have a false stamp.
+inline constexpr int kConfirmed = 3;
+/// Chosen: one sample may be lost; so many of the usual intervals are a gap.
+inline constexpr double kMissed = 2.5;
+inline constexpr double kSilent = 0.12;  ///< [s] chosen: but not less than this
+
+/// How long a sensor may be silent [s] that usually delivers every `interval` seconds; 0: not known.
+[[nodiscard]] inline double longest_silence(double interval) { return std::max(kSilent, kMissed * interval); }
+
+}  // namespace ear
