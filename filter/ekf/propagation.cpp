@@ -1,5 +1,7 @@
 #include "filter/ekf/propagation.h"
 
+#include <algorithm>
+
 namespace ear {
 
 ImuState integrate(const ImuState& x, const Eigen::Vector3d& gyro_B, const Eigen::Vector3d& accel_B, double dt) {
@@ -35,6 +37,8 @@ BodyMotion motion_at(TimeNs t_ns, const ImuState& x, const ImuBuffer& samples) {
   motion.v_W = x.v_W - kGravity_W * seconds_between(t_ns, x.t_ns) - motion.R_WB * gained;
   return motion;
 }
+
+double taken_back_sigma(double tilt, double delay) { return kGravity_W.norm() * tilt * std::max(0.0, delay); }
 
 Eigen::Matrix3d gyro_rotation(TimeNs from_ns, TimeNs to_ns, const Eigen::Vector3d& b_g, const ImuBuffer& samples) {
   if (to_ns < from_ns) return gyro_rotation(to_ns, from_ns, b_g, samples).transpose();

@@ -36,6 +36,10 @@ struct BodyMotion {
 /// At `t_ns`, taken back there by the samples if the state `x` has passed it; else those of the state.
 [[nodiscard]] BodyMotion motion_at(TimeNs t_ns, const ImuState& x, const ImuBuffer& samples);
 
+/// What the velocity of motion_at() is less certain by than that of the state [m/s], `delay` seconds later, which is
+/// tilted by `tilt` [rad], a standard deviation: it takes that part of gravity along.
+[[nodiscard]] double taken_back_sigma(double tilt, double delay);
+
 /// The rotation from one time to another, earlier or later, by the gyroscope, its bias `b_g` removed: R_B0B1.
 [[nodiscard]] Eigen::Matrix3d gyro_rotation(TimeNs from_ns, TimeNs to_ns, const Eigen::Vector3d& b_g,
                                             const ImuBuffer& samples);

@@ -45,6 +45,7 @@ void Ingest::restart() {
   fresh.imu_clock_ = std::move(imu_clock_);
   fresh.encoder_clock_ = encoder_clock_;
   fresh.camera_clock_ = camera_clock_;
+  fresh.even_clock_ = even_clock_;
   fresh.guard_ = std::move(guard_);
   fresh.guard_.restart();
   *this = std::move(fresh);
@@ -76,7 +77,10 @@ Ingest::Encoders Ingest::take(EncoderSample sample, std::optional<TimeNs> state_
   if (!stamp) return {guard_.refuse_encoder(), std::nullopt};
   sample.t_ns = *stamp;
   const Verdict verdict = guard_.judge(sample, state_ns, *encoder_);
-  return {verdict, verdict == Verdict::accepted ? encoder_->add(sample) : std::nullopt};
+  if (verdict != Verdict::accepted) return {verdict, std::nullopt};
+  std::optional<WheelIncrement> increment = encoder_->add(sample);
+  if (increment) even_clock_.correct(*increment);
+  return {verdict, increment};
 }
 
 std::optional<TimeNs> Ingest::imu_due() const {

@@ -9,6 +9,7 @@
 #include "ear/filter_config.h"
 #include "ear/types.h"
 #include "filter/ingest/beam_ranges.h"
+#include "filter/ingest/even_clock.h"
 #include "filter/ingest/impact_guard.h"
 #include "filter/ingest/imu_buffer.h"
 #include "filter/ingest/imu_clock.h"
@@ -89,6 +90,7 @@ class Ingest {
   Calibration calibration_;
   ImuClock imu_clock_;
   StreamClock encoder_clock_, camera_clock_;
+  EvenClock even_clock_;
   InputGuard guard_;
   ImpactGuard impact_guard_;
   ImuSpikes spikes_;

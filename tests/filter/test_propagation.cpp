@@ -129,3 +129,27 @@ TEST_CASE("propagation: yaw and position stay unobservable whatever the state") 
   N.block<3, 3>(err::rho, 1).setIdentity();
   CHECK((step.Phi * N - N).norm() < 1e-12);
 }
+
+TEST_CASE(
+    "propagation: a velocity taken back is less certain by gravity over the delay, as far as the state is tilted") {
+  std::mt19937_64 rng{23};
+  const double tilt = 0.01, delay = 0.4;
+  ImuBuffer samples(300);
+  for (int i = 0; i <= 200; ++i) {  // it stands
+    ImuSample sample;
+    sample.t_ns = TimeNs{5'000'000} * i;
+    sample.accel_B = -kGravity_W;
+    samples.push(sample, {});
+  }
+  double squares = 0.0;
+  const int draws = 2000;
+  for (int k = 0; k < draws; ++k) {
+    ImuState x;
+    x.t_ns = 1'000'000'000;
+    std::normal_distribution<double> draw(0.0, tilt);
+    x.R_WB = exp_so3({draw(rng), draw(rng), 0.0});
+    squares += motion_at(x.t_ns - 400'000'000, x, samples).v_W.head<2>().squaredNorm() / 2.0;
+  }
+  CHECK(taken_back_sigma(tilt, delay) == doctest::Approx(std::sqrt(squares / draws)).epsilon(0.05));
+  CHECK(taken_back_sigma(tilt, -delay) == 0.0);
+}

@@ -23,6 +23,7 @@ void Wheels::update(const WheelIncrement& increment, const Context& context, Ekf
   rate.noise_factor *= context.gyro_noise;
   WheelRows rows = linearize_wheels(x, motion.R_WB, motion.v_W, increment, rate.gyro_B, config_.model, sees_ground_);
   Sigmas sigma = noise_of(rows, increment, rate, x);
+  add_delay(sigma, increment, ekf);
   score_wheels(rows, sigma, increment.to_ns, context, ekf, records);
 
   const bool use_yaw_rate = config_.model != OdometerModel::gyro;
@@ -82,6 +83,13 @@ Wheels::Sigmas Wheels::noise_of(const WheelRows& rows, const WheelIncrement& inc
       root_sum(WheelRows::yaw_rate,
                {config_.yaw_rate_sigma, count_noise * 2.0 / x.odometer.track_width, stamp_noise * yaw_rate});
   return sigma;
+}
+
+/// A reading that the state has passed is compared with the velocity then, taken back by the inertial samples.
+void Wheels::add_delay(Sigmas& sigma, const WheelIncrement& increment, const Ekf& ekf) {
+  const double tilt = std::sqrt(ekf.covariance().matrix().diagonal().segment<2>(err::theta).maxCoeff());
+  const double late = taken_back_sigma(tilt, seconds_between(increment.to_ns, ekf.state().imu.t_ns));
+  for (const int row : {WheelRows::speed, WheelRows::side, WheelRows::slope}) sigma(row) = std::hypot(sigma(row), late);
 }
 
 /// Each wheel by itself: the axle's speed and yaw rate predict how fast it should roll. Where the speed is measured
