@@ -4,6 +4,7 @@ test_real_data.py ROOT EAR_PROGRAM [TEST...]
 """
 
 import array
+import io
 import json
 import math
 import shutil
@@ -11,6 +12,7 @@ import subprocess
 import sys
 import tempfile
 import unittest
+import zipfile
 from pathlib import Path
 
 ROOT = Path(sys.argv.pop(1)).resolve()
@@ -252,6 +254,43 @@ class Comma(RealData):
     def test_missing_file(self):
         (self.work / "s/global_pose/frame_positions").unlink()
         self.assert_refused("comma2k19", "s", "global_pose/frame_positions: is missing")
+
+
+class Ucsd(RealData):
+    def setUp(self):
+        super().setUp()
+        self.encoders = {"time_stamps": npy([10.0, 10.025, 10.05]), "counts": npy([[0, 4, 8], [0, 1, 2], [0, 5, 8], [0, 1, 3]])}
+        self.write_archive("r/Encoders7.npz", self.encoders)
+        self.imu = {"time_stamps": npy([10.0, 10.01]), "angular_velocity": npy([[0.1, 0.4], [0.2, 0.5], [0.3, 0.6]]),
+                    "linear_acceleration": npy([[0.0, 0.1], [0.0, -0.1], [1.0, 1.0]])}
+        self.write_archive("r/Imu7.npz", self.imu)
+
+    def write_archive(self, name, arrays):
+        content = io.BytesIO()
+        with zipfile.ZipFile(content, "w") as archive:
+            for member, data in arrays.items():
+                archive.writestr(member + ".npy", data)
+        self.write(name, content.getvalue())
+
+    def test_run(self):
+        mav0 = self.convert("ucsd", "r")
+        self.assertEqual(csv_rows(mav0 / "encoder0/data.csv"),
+                         [["10000000000", "0", "0"], ["10025000000", "2", "9"], ["10050000000", "7", "25"]])
+        row = [float(x) for x in csv_rows(mav0 / "imu0/data.csv")[1]]
+        for value, expected in zip(row, [10.01e9, 0.4, 0.5, 0.6, 0.980665, -0.980665, 9.80665]):
+            self.assertAlmostEqual(value, expected, places=6)
+
+    def test_bad_input(self):
+        self.write_archive("r/Encoders7.npz", {**self.encoders, "counts": npy([[0, 4], [0, 1], [0, 5], [0, 1]])})
+        self.assert_refused("ucsd", "r", "Encoders7.npz: 2 columns of counts, but 3 time_stamps")
+        self.write_archive("r/Encoders7.npz", {**self.encoders, "counts": npy([[0, 4, 8], [0, 1, 2]])})
+        self.assert_refused("ucsd", "r", "Encoders7.npz: counts of 2 wheels where 4 are expected")
+        self.write_archive("r/Encoders7.npz", {"time_stamps": self.encoders["time_stamps"]})
+        self.assert_refused("ucsd", "r", "Encoders7.npz: There is no item named 'counts.npy' in the archive")
+        self.write("r/Encoders7.npz", "hello")
+        self.assert_refused("ucsd", "r", "Encoders7.npz: cannot be read: File is not a zip file")
+        (self.work / "r/Encoders7.npz").unlink()
+        self.assert_refused("ucsd", "r", "0 files Encoders*.npz where one is expected")
 
 
 class References(RealData):

@@ -33,8 +33,9 @@ DATA_SETS = [
             "wheels and IMU; no converter yet", "ODbL", "http://robots.engin.umich.edu/nclt/"),
     DataSet("px4_logs", "PX4 flight logs: IMU, GPS, the flight controller's own estimate",
             "no images and no wheels: nothing carries an estimate", "CC BY (PX4)", "https://review.px4.io/"),
-    DataSet("ucsd", "a skid-steered robot indoors: encoders 40 Hz, IMU 100 Hz, planar lidar SLAM by students",
-            "here as ucsd_20; its original layout is not documented", "none stated: local only", "not stated"),
+    DataSet("ucsd", "a course at UCSD: a skid-steered robot indoors, encoders 40 Hz, IMU 100 Hz; no truth but lidar SLAM by students",
+            "wheels and IMU; the scans of its lidar are left out", "none stated: local only",
+            "https://github.com/shangweihung/Simultaneous-Localization-and-Mapping", "ucsd"),
     DataSet("lawn_wheels", "a mower on grass: wheel speeds in coarse steps, IMU 66.7 Hz, position by radio",
             "here as lawn_wheels; its original layout is not documented", "none stated: local only", "not stated"),
 ]

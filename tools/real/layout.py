@@ -6,6 +6,7 @@ import math
 import re
 import shutil
 import sys
+import zipfile
 from datetime import datetime, timezone
 
 
@@ -69,9 +70,27 @@ def read_numbers(path, fields):
 def read_array(path, columns):
     """Rows of a two-dimensional .npy file of numbers, or of a one-dimensional one where `columns` is 1."""
     try:
-        data = path.read_bytes()
+        return parse_array(path.read_bytes(), path, columns)
     except FileNotFoundError:
         raise BadInput(f"{path}: is missing") from None
+
+
+def read_archive(path, names):
+    """Arrays of a .npz file, by name: columns as lists, so that an array of c x n has n columns of c."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            members = {name: archive.read(name + ".npy") for name in names}
+    except FileNotFoundError:
+        raise BadInput(f"{path}: is missing") from None
+    except KeyError as error:
+        raise BadInput(f"{path}: {error.args[0]}") from None
+    except (zipfile.BadZipFile, EOFError, OSError) as error:
+        raise BadInput(f"{path}: cannot be read: {error}") from None
+    return {name: transpose(parse_array(data, f"{path}, {name}")) for name, data in members.items()}
+
+
+def parse_array(data, path, columns=None):
+    """Rows of the bytes of a .npy file; as many columns as there are where it is not said."""
     if data[:6] != b"\x93NUMPY" or len(data) < 12:
         raise BadInput(f"{path}: is no numpy array")
     begin, size = (10, int.from_bytes(data[8:10], "little")) if data[6] == 1 else (12, int.from_bytes(data[8:12], "little"))
@@ -80,11 +99,11 @@ def read_array(path, columns):
         kind, shape, fortran = header["descr"], header["shape"], header["fortran_order"]
     except (SyntaxError, ValueError, KeyError, TypeError):
         raise BadInput(f"{path}: the header of the array is torn") from None
-    codes = {"<f8": "d", "<f4": "f", "<i8": "q"}
+    codes = {"<f8": "d", "<f4": "f", "<i8": "q", "<i2": "h"}
     if kind not in codes or len(shape) not in (1, 2):
-        raise BadInput(f"{path}: an array of {kind} with shape {shape}: only one or two dimensions of <f8, <f4 or <i8 are read")
+        raise BadInput(f"{path}: an array of {kind} with shape {shape}: only one or two dimensions of {', '.join(codes)} are read")
     width = shape[1] if len(shape) == 2 else 1
-    if width != columns:
+    if columns is not None and width != columns:
         raise BadInput(f"{path}: {width} columns where {columns} are expected")
     values = array.array(codes[kind])
     body = data[begin + size :]
