@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <iterator>
 #include <stdexcept>
@@ -25,8 +26,8 @@ struct SuiteRecording {
   const char* sequence;
   double starts;  ///< [s] when it does what it is called
 };
-constexpr SuiteRecording kRecordings[] = {
-    {"standing", "static", 2.0}, {"drive", "flat1", 3.0}, {"flight", "fly1", 10.0}};
+constexpr std::array kRecordings = {SuiteRecording{"standing", "static", 2.0}, SuiteRecording{"drive", "flat1", 3.0},
+                                    SuiteRecording{"flight", "fly1", 10.0}};
 
 const SuiteRecording& recording_named(const std::string& name) {
   const auto* const found = std::find_if(std::begin(kRecordings), std::end(kRecordings),

@@ -45,9 +45,10 @@ std::vector<std::string> sequences_of(const ExperimentsArguments& args) {
   }
   for (const std::string& name : args.only) {
     if (std::find(known.begin(), known.end(), name) != known.end()) continue;
-    std::string names;
-    for (const std::string& one : known) names.append(names.empty() ? "" : ", ").append(one);
-    throw std::invalid_argument("--only: no sequence '" + name + "'; there are " + names);
+    std::string refusal = "--only: no sequence '";
+    refusal.append(name).append("'; there are");
+    for (const std::string& one : known) refusal.append(one == known.front() ? " " : ", ").append(one);
+    throw std::invalid_argument(refusal);
   }
   return args.only;
 }
@@ -90,6 +91,7 @@ void run_experiments(ExperimentsArguments args) {
   const std::size_t made = paper::measure(conditions, setups);
 
   std::vector<std::pair<paper::Setup, std::vector<paper::Result>>> measured;
+  measured.reserve(setups.size());
   for (const paper::Setup& setup : setups) measured.emplace_back(setup, paper::results_of(conditions, setup));
   const paper::Lookup lookup = [&](const paper::Setup& setup) -> const std::vector<paper::Result>& {
     return std::find_if(measured.begin(), measured.end(), [&](const auto& m) { return m.first == setup; })->second;

@@ -1,9 +1,8 @@
 // ear live: sensors in, estimate out, until SIGINT or SIGTERM.
 #include <opencv2/core/utility.hpp>
 
-#include <signal.h>
-
 #include <cmath>
+#include <csignal>
 #include <cstdio>
 #include <filesystem>
 #include <memory>

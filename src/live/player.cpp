@@ -95,7 +95,10 @@ class Player::Feed {
         laser_(intake, first_ns, kAhead),
         camera_(intake, first_ns, kFramesAhead) {}
 
-  void deal(Sample sample) { sensor(sample).deal(std::move(sample)); }
+  void deal(Sample sample) {
+    Sensor& its_sensor = sensor(sample);
+    its_sensor.deal(std::move(sample));
+  }
   void drop() {
     for (Sensor* one : {&imu_, &encoder_, &laser_, &camera_}) one->drop();
   }

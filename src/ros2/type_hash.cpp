@@ -23,7 +23,7 @@ constexpr int kTypeId<std::int32_t> = 6;
 template <>
 constexpr int kTypeId<std::uint32_t> = 7;
 template <>
-constexpr int kTypeId<float> = 10;
+[[maybe_unused]] constexpr int kTypeId<float> = 10;
 template <>
 constexpr int kTypeId<double> = 11;
 template <>

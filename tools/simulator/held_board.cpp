@@ -36,9 +36,9 @@ HeldBoard::HeldBoard(const BoardShow& show, const Trajectory& trajectory, const 
   const int count = static_cast<int>(std::ceil((show.end - show.begin) / kPerPlace)) + 1;
   for (int i = 0; i < count; ++i) {
     const double depth = std::array{0.34, 0.48, 0.62}[static_cast<std::size_t>(i / 9 % 3)] * uniform(rng, 0.9, 1.1);
-    const int cell = (4 * i) % 9;  // of 3 x 3, not one beside the last
+    const int cell = (4 * i) % 9, row = cell / 3;  // of 3 x 3, not one beside the last
     const double x = 0.45 * (cell % 3 - 1) + uniform(rng, -0.08, 0.08);
-    const double y = 0.32 * (cell / 3 - 1) + uniform(rng, -0.08, 0.08);
+    const double y = 0.32 * (row - 1) + uniform(rng, -0.08, 0.08);
     const double tilt = uniform(rng, 10.0, 45.0) * kDegree;
     const double axis = uniform(rng, -kPi, kPi);
     Place place;
