@@ -549,25 +549,29 @@ void position_moments(const PatchPixels& patch, PatchMoments& out) {
   out.middle2 = grey(middle2, kPatchUnit * kPatchUnit);
 }
 
-void halve_row(const std::array<const std::uint8_t*, 5>& rows, int width, std::int16_t* sums, std::uint8_t* out) {
+// Sixteen pixels of all rows at a time, so that each row is summed across only once.
+void halve(const std::uint8_t* middle, std::ptrdiff_t stride, int width, int rows, std::uint8_t* out,
+           std::ptrdiff_t out_stride) {
   constexpr int kReach = 2;
-  // Factors of neighbours.
-  alignas(32) constexpr std::int16_t kFirst[16] = {1, 4, 1, 4, 1, 4, 1, 4, 1, 4, 1, 4, 1, 4, 1, 4};
-  alignas(32) constexpr std::int16_t kSecond[16] = {6, 4, 6, 4, 6, 4, 6, 4, 6, 4, 6, 4, 6, 4, 6, 4};
-  alignas(32) constexpr std::int16_t kThird[16] = {1, 0, 1, 0, 1, 0, 1, 0, 1, 0, 1, 0, 1, 0, 1, 0};
-  const auto pairs = [](const std::int16_t* p, const std::int16_t* factors) {
-    return dot(load<Words>(p), load<Words>(factors));
-  };
-  for (int i = 0; i < 2 * width + 2 * kReach; i += 16) {
-    const auto row = [&](std::size_t k) { return words_at(rows[k] - kReach + i); };
-    const Words middle = row(2);
-    store(sums + i, (row(0) + row(4)) + ((row(1) + row(3) + middle) << 2) + (middle << 1));
-  }
-  for (int i = 0; i < width; i += 16) {
-    const auto eight = [&](const std::int16_t* p) {
-      return (pairs(p, kFirst) + pairs(p + 2, kSecond) + pairs(p + 4, kThird) + 128) >> 8;
-    };
-    store_bytes(out + i, eight(sums + 2 * i), eight(sums + 2 * i + 16));
+  const auto across = [](const std::uint8_t* p) { return pairs(p, 1, 4) + pairs(p + 2, 6, 4) + evens(p + 4); };
+  for (int from = 0; from < width; from += kSize) {
+    const std::uint8_t* p = middle - kReach * stride + (2 * from - kReach);
+    std::uint8_t* to = out + from;
+    Words first = across(p);
+    Words second = across(p + stride);
+    Words third = across(p + 2 * stride);
+    for (int row = 0; row < rows; ++row, to += out_stride) {
+      const Words fourth = across(p + 3 * stride);
+      const Words fifth = across(p + 4 * stride);
+      // Of the sum and 128, which would be up to 65408, half of 65536 is taken off: four times 8160 are 32640.
+      const Words inner = (second + third + fourth + word(-8160)) << 2;
+      const Words sum = inner + (first + fifth + (third << 1));
+      store_bytes(to, (sum >> 8) + word(128));
+      first = third;
+      second = fourth;
+      third = fifth;
+      p += 2 * stride;
+    }
   }
 }
 
