@@ -198,16 +198,13 @@ class Walk {
   // For either half of a row: the pixels that are fetched, and where between them the first of the eight lies.
   void prepare(int rows, int margin) {
     constexpr int kHalf = 1 << (kLessBits - 1);
+    alignas(32) constexpr int kSquares[kSize] = {0, 1,  4,  9,  16, 25,  36,  49,    // of the column in its half, and
+                                                 0, 17, 36, 57, 80, 105, 132, 161};  // what eight more columns add
     for (std::size_t k = 0; k < 2; ++k) {
-      alignas(32) std::int16_t bent[kSize];
       const int bend = bend_[k];
-      for (int i = 0; i < 8; ++i) {
-        bent[i] = word((i * i * bend) >> kLessBits);
-        bent[i + 8] = word(((i * i + 16 * i) * bend) >> kLessBits);
-      }
-      bent_[k] = load<Words>(bent);
-      last_bent_[k][0] = bent[7];
-      last_bent_[k][1] = bent[15];
+      bent_[k] = narrow((load<Ints>(kSquares) * bend) >> kLessBits, (load<Ints>(kSquares + 8) * bend) >> kLessBits);
+      last_bent_[k][0] = (kSquares[7] * bend) >> kLessBits;
+      last_bent_[k][1] = (kSquares[15] * bend) >> kLessBits;
     }
     const auto stride = static_cast<int>(stride_);
     for (int from = 0; from < rows; from += 8) {

@@ -58,6 +58,12 @@ inline Words words_at(const std::uint8_t* p) {
   return reinterpret_cast<Words>(_mm256_cvtepu8_epi16(_mm_loadu_si128(reinterpret_cast<const __m128i*>(p))));
 }
 
+/// Numbers of 16 bits.
+inline Words narrow(Ints first, Ints second) {
+  const __m256i fours = _mm256_packs_epi32(reinterpret_cast<__m256i>(first), reinterpret_cast<__m256i>(second));
+  return reinterpret_cast<Words>(_mm256_permute4x64_epi64(fours, 0xd8));  // first, second, first, second
+}
+
 /// Of 32 bytes: 0, 2, 4 ... times `even` plus 1, 3, 5 ... times `odd`; from 0 to 127 both.
 inline Words pairs(const std::uint8_t* p, std::int16_t even, std::int16_t odd) {
   const __m256i factors = _mm256_set1_epi16(static_cast<std::int16_t>(odd << 8 | even));
@@ -176,6 +182,21 @@ inline Eight16 words_of(const std::uint8_t* p) {
 #endif
 }
 inline Words words_at(const std::uint8_t* p) { return {words_of(p), words_of(p + 8)}; }
+
+inline Eight16 narrow(const Ints& numbers) {
+#if defined(__SSE2__)
+  return reinterpret_cast<Eight16>(
+      _mm_packs_epi32(reinterpret_cast<__m128i>(numbers.low), reinterpret_cast<__m128i>(numbers.high)));
+#else
+  Eight16 result{};
+  for (int i = 0; i < 4; ++i) {
+    result[i] = static_cast<std::int16_t>(numbers.low[i]);
+    result[i + 4] = static_cast<std::int16_t>(numbers.high[i]);
+  }
+  return result;
+#endif
+}
+inline Words narrow(const Ints& first, const Ints& second) { return {narrow(first), narrow(second)}; }
 
 inline Eight16 eight_pairs(const std::uint8_t* p, std::int16_t even, std::int16_t odd) {
 #if defined(__SSSE3__)
