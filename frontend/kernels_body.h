@@ -560,7 +560,7 @@ void halve(const std::uint8_t* middle, std::ptrdiff_t stride, int width, int row
     for (int row = 0; row < rows; ++row, to += out_stride) {
       const Words fourth = across(p + 3 * stride);
       const Words fifth = across(p + 4 * stride);
-      // Of the sum and 128, which would be up to 65408, half of 65536 is taken off: four times 8160 are 32640.
+      // With its rounding the sum is up to 65408. 32768 less the rounding, four times 8160, is taken off.
       const Words inner = (second + third + fourth + word(-8160)) << 2;
       const Words sum = inner + (first + fifth + (third << 1));
       store_bytes(to, (sum >> 8) + word(128));
