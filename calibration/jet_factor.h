@@ -35,22 +35,7 @@ class JetFactor final : public ceres::SizedCostFunction<kResiduals, kBlocks...> 
  public:
   explicit JetFactor(Model model) : model_(std::move(model)) {}
 
-  /// Flattened: left to itself the compiler calls a function for each operation on a jet.
-  [[gnu::flatten]] bool Evaluate(double const* const* blocks, double* residual, double** jacobians) const override {
-    if (jacobians == nullptr) {
-      model_(values<double>(blocks), residual);
-      return true;
-    }
-    std::array<Jet, kResiduals> r;
-    model_(values<Jet>(blocks), r.data());
-    for (int row = 0; row < kResiduals; ++row) residual[row] = r[static_cast<std::size_t>(row)].a;
-    int first = 0;
-    for (std::size_t i = 0; i < kCount; ++i) {
-      if (jacobians[i] != nullptr) store(r, first, kSizes[i], jacobians[i]);
-      first += steps(kSizes[i]);
-    }
-    return true;
-  }
+  bool Evaluate(double const* const* blocks, double* residual, double** jacobians) const override;
 
  private:
   static constexpr std::size_t kCount = sizeof...(kBlocks);
@@ -104,5 +89,25 @@ class JetFactor final : public ceres::SizedCostFunction<kResiduals, kBlocks...> 
 
   Model model_;
 };
+
+// Flattened: left to itself the compiler calls a function for each operation on a jet. Outside of the class, so that
+// only one file needs to compile it where it is costly (models.h).
+template <typename Model, int kResiduals, int... kBlocks>
+[[gnu::flatten]] bool JetFactor<Model, kResiduals, kBlocks...>::Evaluate(double const* const* blocks, double* residual,
+                                                                         double** jacobians) const {
+  if (jacobians == nullptr) {
+    model_(values<double>(blocks), residual);
+    return true;
+  }
+  std::array<Jet, kResiduals> r;
+  model_(values<Jet>(blocks), r.data());
+  for (int row = 0; row < kResiduals; ++row) residual[row] = r[static_cast<std::size_t>(row)].a;
+  int first = 0;
+  for (std::size_t i = 0; i < kCount; ++i) {
+    if (jacobians[i] != nullptr) store(r, first, kSizes[i], jacobians[i]);
+    first += steps(kSizes[i]);
+  }
+  return true;
+}
 
 }  // namespace ear::calibration

@@ -225,4 +225,9 @@ using OriginFactor = JetFactor<OriginModel, 4, 7>;
 using BiasFactor = JetFactor<BiasModel, 6, 9>;
 using ReferenceFactor = JetFactor<ReferenceModel, 3, 7, 9, 4>;
 
+// Compiled in files of their own, since each takes the compiler hundreds of megabytes.
+extern template class JetFactor<RollModel, 3, 7, 7, 9, 3, 5, 1>;
+extern template class JetFactor<BeamModel, 1, 7, 9, 3, 5, 1>;
+extern template class JetFactor<ReferenceModel, 3, 7, 9, 4>;
+
 }  // namespace ear::calibration

@@ -39,13 +39,6 @@ inline Ints add_products(Ints a, Ints b) {
   return reinterpret_cast<Ints>(_mm256_madd_epi16(reinterpret_cast<__m256i>(a), reinterpret_cast<__m256i>(b)));
 }
 
-/// Numbers from 0 to 255, as bytes.
-inline void store_bytes(std::uint8_t* p, Ints numbers) {
-  const auto all = reinterpret_cast<__m256i>(numbers);
-  const __m128i words = _mm_packs_epi32(_mm256_castsi256_si128(all), _mm256_extracti128_si256(all, 1));
-  _mm_storel_epi64(reinterpret_cast<__m128i*>(p), _mm_packus_epi16(words, words));
-}
-
 #else
 
 using Floats4 = float __attribute__((vector_size(16)));
@@ -107,19 +100,6 @@ inline Ints4 add_products(Ints4 a, Ints4 b) {
 }
 inline Ints add_products(const Ints& a, const Ints& b) {
   return {add_products(a.low, b.low), add_products(a.high, b.high)};
-}
-
-inline void store_bytes(std::uint8_t* p, const Ints& numbers) {
-#if defined(__SSE2__)
-  const __m128i words =
-      _mm_packs_epi32(reinterpret_cast<__m128i>(numbers.low), reinterpret_cast<__m128i>(numbers.high));
-  _mm_storel_epi64(reinterpret_cast<__m128i*>(p), _mm_packus_epi16(words, words));
-#else
-  for (int i = 0; i < 4; ++i) {
-    p[i] = static_cast<std::uint8_t>(numbers.low[i]);
-    p[i + 4] = static_cast<std::uint8_t>(numbers.high[i]);
-  }
-#endif
 }
 
 #endif  // __AVX2__

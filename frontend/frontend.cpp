@@ -91,6 +91,7 @@ class Frontend::Impl {
   [[nodiscard]] MotionGuess track_probes(const MotionGuess& guess);
   [[nodiscard]] bool track_one(Track& track, const Transfer& motion, int level) const;
   [[nodiscard]] int probe_level(const MotionGuess& guess) const;
+  [[nodiscard]] int level_without_depth(const Transfer& measured) const;
   [[nodiscard]] Flow flow(std::size_t track) const;
   void reject();
   void match_stereo();
@@ -223,11 +224,13 @@ void Frontend::Impl::track(const MotionPrediction& prediction) {
   keep.assign(tracks_.size(), 0);
   motion_ = track_probes(camera_motion(prediction));
   const int known = motion_.rotation_known ? kLevelPredicted : kLevelUnknown;
+  const int without_depth = surprise_ < kFar ? level_without_depth(motion_.motion) : known;
   for (std::size_t i = 0; i < tracks_.size(); ++i) {
     if (keep[i]) continue;
     const bool predictable = motion_.translation_known && tracks_[i].has_depth;
-    keep[i] = (predictable && track_one(tracks_[i], motion_.motion, kLevelMeasured)) ||
-              track_one(tracks_[i], motion_.motion, known);
+    const int first = predictable ? kLevelMeasured : without_depth;
+    keep[i] =
+        (first < known && track_one(tracks_[i], motion_.motion, first)) || track_one(tracks_[i], motion_.motion, known);
   }
   // Of two tracks that have run into each other, the younger goes. Older ones come first.
   for (std::size_t i = 0; i < tracks_.size(); ++i) {
@@ -246,6 +249,19 @@ int Frontend::Impl::probe_level(const MotionGuess& guess) const {
   if (!guess.translation_known) return kLevelPredicted;
   int level = 0;
   while (level < kLevelPredicted && surprise_ > static_cast<float>(1 << level)) ++level;
+  return level;
+}
+
+// The same for features without depth, in a motion that was measured: none is taken to be nearer than all that have
+// one.
+int Frontend::Impl::level_without_depth(const Transfer& measured) const {
+  double nearest = 0.0;
+  for (const Track& track : previous_) {
+    if (track.has_depth) nearest = std::max(nearest, track.surface.inverse_depth(track.left_ray));
+  }
+  const double farthest_px = lens_.focal_px() * measured.p_10.norm() * nearest;
+  int level = 0;
+  while (level < kLevelPredicted && farthest_px > static_cast<double>(1 << level)) ++level;
   return level;
 }
 

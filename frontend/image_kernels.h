@@ -87,10 +87,11 @@ struct ImageKernels {
   /// pixels around are read, and up to 31 more than `width` are looked at and written.
   void (*corner_scores)(const std::uint8_t* row, std::ptrdiff_t stride, int width, int threshold, std::uint8_t* scores);
   void (*texture)(const std::uint8_t* middle, std::ptrdiff_t stride, TextureSums& sums);
-  /// One row of an image half as large: `width` pixels, each 1/256 (1 4 6 4 1) (1 4 6 4 1)^T around every second pixel
-  /// of the middle one of five rows, rounded; the first is around column 0. Columns from -2 to 2 width + 1 and up
-  /// to 30 more are read, up to 15 more pixels than `width` are written. `sums`: room for 2 width + 64 numbers.
-  void (*halve_row)(const std::array<const std::uint8_t*, 5>& rows, int width, std::int16_t* sums, std::uint8_t* out);
+  /// `rows` rows of an image half as large: `width` pixels, each 1/256 (1 4 6 4 1) (1 4 6 4 1)^T around every second
+  /// pixel of every second row, rounded; the first is around `middle`. Of the rows from 2 above that to 2 `rows` below,
+  /// columns from -2 to 2 width + 1 and up to 30 more are read; up to 15 more pixels than `width` are written.
+  void (*halve)(const std::uint8_t* middle, std::ptrdiff_t stride, int width, int rows, std::uint8_t* out,
+                std::ptrdiff_t out_stride);
 };
 
 /// Those that this build has and this processor can run, the best one last.

@@ -1,7 +1,7 @@
 #include "frontend/image_pyramid.h"
 
 #include <algorithm>
-#include <array>
+#include <cstdint>
 #include <cstring>
 
 namespace ear {
@@ -10,6 +10,7 @@ namespace {
 constexpr int kSmallest = ImagePyramid::kBorder;  // [px] no level but the first is so narrow or low
 constexpr int kBand = 32;                         // rows; the last one of a level is higher, up to twice
 static_assert(kBand > ImagePyramid::kBorder, "a border mirrors one band");
+static_assert(ImagePyramid::kBorder % 8 == 0, "mirrored in eights");
 
 // The row of an image that one beyond its edge mirrors, without repeating that at the edge. The same for columns.
 int mirrored(int row, int height) {
@@ -41,6 +42,14 @@ Range bands_seen(int first, int last, int height) {
 
 std::uint8_t* row_of(std::uint8_t* origin, const GreyLevel& level, int row) { return origin + row * level.stride; }
 
+// Eight pixels in the reverse order.
+void copy_reversed(const std::uint8_t* from, std::uint8_t* to) {
+  std::uint64_t eight = 0;
+  std::memcpy(&eight, from, sizeof(eight));
+  eight = __builtin_bswap64(eight);
+  std::memcpy(to, &eight, sizeof(eight));
+}
+
 // Fills the border that mirrors these rows.
 void mirror_edges(const GreyLevel& level, std::uint8_t* origin, const Range& rows) {
   constexpr int kBorder = ImagePyramid::kBorder;
@@ -48,9 +57,9 @@ void mirror_edges(const GreyLevel& level, std::uint8_t* origin, const Range& row
     std::uint8_t* const first = row_of(origin, level, row);
     std::uint8_t* const last = first + level.width - 1;
     if (level.width > kBorder) {
-      for (int i = 1; i <= kBorder; ++i) {
-        first[-i] = first[i];
-        last[i] = last[-i];
+      for (int i = 1; i <= kBorder; i += 8) {
+        copy_reversed(first + i, first - i - 7);
+        copy_reversed(last - i - 7, last + i);
       }
     } else {
       for (int i = 1; i <= kBorder; ++i) {
@@ -82,7 +91,6 @@ bool ImagePyramid::shows(const ImageView& image) const {
 
 void ImagePyramid::allocate(int width, int height) {
   levels_.clear();
-  sums_.assign(static_cast<std::size_t>(width) + 64, 0);
   while (static_cast<int>(levels_.size()) < max_levels_) {
     Level level;
     level.width = width;
@@ -136,13 +144,8 @@ void ImagePyramid::make(std::size_t index, std::size_t band) const {
   const Level& out = levels_[index];
   const Range rows = rows_of(static_cast<int>(band), out.height);
   const GreyLevel& finer = level(static_cast<int>(index) - 1, 2 * rows.first - kReach, 2 * (rows.end - 1) + kReach);
-  for (int row = rows.first; row < rows.end; ++row) {
-    std::array<const std::uint8_t*, 5> taps{};
-    for (int k = 0; k < 5; ++k) {
-      taps[static_cast<std::size_t>(k)] = finer.origin + (2 * row + k - kReach) * finer.stride;
-    }
-    kernels_.halve_row(taps, out.width, sums_.data(), row_of(out.pixels(), out, row));
-  }
+  kernels_.halve(finer.origin + 2 * rows.first * finer.stride, finer.stride, out.width, rows.end - rows.first,
+                 row_of(out.pixels(), out, rows.first), out.stride);
   mirror_edges(out, out.pixels(), rows);
   out.made[band] = 1;
 }

@@ -57,8 +57,7 @@ class ImagePyramid {
   ImageKernels kernels_;
   int max_levels_;
   bool built_ = false;
-  std::vector<Level> levels_;               // for images of the size that was there last
-  mutable std::vector<std::int16_t> sums_;  // of a row
+  std::vector<Level> levels_;  // for images of the size that was there last
 };
 
 }  // namespace ear

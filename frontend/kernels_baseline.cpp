@@ -20,7 +20,7 @@ ImageKernels kernels_baseline() {
           baseline::position_moments,
           baseline::corner_scores,
           baseline::texture,
-          baseline::halve_row};
+          baseline::halve};
 }
 
 }  // namespace ear

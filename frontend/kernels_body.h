@@ -198,16 +198,13 @@ class Walk {
   // For either half of a row: the pixels that are fetched, and where between them the first of the eight lies.
   void prepare(int rows, int margin) {
     constexpr int kHalf = 1 << (kLessBits - 1);
+    alignas(32) constexpr int kSquares[kSize] = {0, 1,  4,  9,  16, 25,  36,  49,    // of the column in its half, and
+                                                 0, 17, 36, 57, 80, 105, 132, 161};  // what eight more columns add
     for (std::size_t k = 0; k < 2; ++k) {
-      alignas(32) std::int16_t bent[kSize];
       const int bend = bend_[k];
-      for (int i = 0; i < 8; ++i) {
-        bent[i] = word((i * i * bend) >> kLessBits);
-        bent[i + 8] = word(((i * i + 16 * i) * bend) >> kLessBits);
-      }
-      bent_[k] = load<Words>(bent);
-      last_bent_[k][0] = bent[7];
-      last_bent_[k][1] = bent[15];
+      bent_[k] = narrow((load<Ints>(kSquares) * bend) >> kLessBits, (load<Ints>(kSquares + 8) * bend) >> kLessBits);
+      last_bent_[k][0] = (kSquares[7] * bend) >> kLessBits;
+      last_bent_[k][1] = (kSquares[15] * bend) >> kLessBits;
     }
     const auto stride = static_cast<int>(stride_);
     for (int from = 0; from < rows; from += 8) {
@@ -549,25 +546,29 @@ void position_moments(const PatchPixels& patch, PatchMoments& out) {
   out.middle2 = grey(middle2, kPatchUnit * kPatchUnit);
 }
 
-void halve_row(const std::array<const std::uint8_t*, 5>& rows, int width, std::int16_t* sums, std::uint8_t* out) {
+// Sixteen pixels of all rows at a time, so that each row is summed across only once.
+void halve(const std::uint8_t* middle, std::ptrdiff_t stride, int width, int rows, std::uint8_t* out,
+           std::ptrdiff_t out_stride) {
   constexpr int kReach = 2;
-  // Factors of neighbours.
-  alignas(32) constexpr std::int16_t kFirst[16] = {1, 4, 1, 4, 1, 4, 1, 4, 1, 4, 1, 4, 1, 4, 1, 4};
-  alignas(32) constexpr std::int16_t kSecond[16] = {6, 4, 6, 4, 6, 4, 6, 4, 6, 4, 6, 4, 6, 4, 6, 4};
-  alignas(32) constexpr std::int16_t kThird[16] = {1, 0, 1, 0, 1, 0, 1, 0, 1, 0, 1, 0, 1, 0, 1, 0};
-  const auto pairs = [](const std::int16_t* p, const std::int16_t* factors) {
-    return dot(load<Words>(p), load<Words>(factors));
-  };
-  for (int i = 0; i < 2 * width + 2 * kReach; i += 16) {
-    const auto row = [&](std::size_t k) { return words_at(rows[k] - kReach + i); };
-    const Words middle = row(2);
-    store(sums + i, (row(0) + row(4)) + ((row(1) + row(3) + middle) << 2) + (middle << 1));
-  }
-  for (int i = 0; i < width; i += 16) {
-    const auto eight = [&](const std::int16_t* p) {
-      return (pairs(p, kFirst) + pairs(p + 2, kSecond) + pairs(p + 4, kThird) + 128) >> 8;
-    };
-    store_bytes(out + i, eight(sums + 2 * i), eight(sums + 2 * i + 16));
+  const auto across = [](const std::uint8_t* p) { return pairs(p, 1, 4) + pairs(p + 2, 6, 4) + evens(p + 4); };
+  for (int from = 0; from < width; from += kSize) {
+    const std::uint8_t* p = middle - kReach * stride + (2 * from - kReach);
+    std::uint8_t* to = out + from;
+    Words first = across(p);
+    Words second = across(p + stride);
+    Words third = across(p + 2 * stride);
+    for (int row = 0; row < rows; ++row, to += out_stride) {
+      const Words fourth = across(p + 3 * stride);
+      const Words fifth = across(p + 4 * stride);
+      // With its rounding the sum is up to 65408. 32768 less the rounding, four times 8160, is taken off.
+      const Words inner = (second + third + fourth + word(-8160)) << 2;
+      const Words sum = inner + (first + fifth + (third << 1));
+      store_bytes(to, (sum >> 8) + word(128));
+      first = third;
+      second = fourth;
+      third = fifth;
+      p += 2 * stride;
+    }
   }
 }
 

@@ -6,7 +6,7 @@ namespace ear {
 
 ImageKernels kernels_sse2() {
   return {Kernels::sse2, sse2::align_position,   sse2::align_affine,  sse2::compare, sse2::compare_along, sse2::capture,
-          sse2::moments, sse2::position_moments, sse2::corner_scores, sse2::texture, sse2::halve_row};
+          sse2::moments, sse2::position_moments, sse2::corner_scores, sse2::texture, sse2::halve};
 }
 
 }  // namespace ear

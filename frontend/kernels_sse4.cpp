@@ -6,7 +6,7 @@ namespace ear {
 
 ImageKernels kernels_sse4() {
   return {Kernels::sse4, sse4::align_position,   sse4::align_affine,  sse4::compare, sse4::compare_along, sse4::capture,
-          sse4::moments, sse4::position_moments, sse4::corner_scores, sse4::texture, sse4::halve_row};
+          sse4::moments, sse4::position_moments, sse4::corner_scores, sse4::texture, sse4::halve};
 }
 
 }  // namespace ear

@@ -58,12 +58,27 @@ inline Words words_at(const std::uint8_t* p) {
   return reinterpret_cast<Words>(_mm256_cvtepu8_epi16(_mm_loadu_si128(reinterpret_cast<const __m128i*>(p))));
 }
 
-/// Sixteen numbers from 0 to 255, of which `first` has eight, as bytes.
-inline void store_bytes(std::uint8_t* p, Ints first, Ints second) {
-  const __m256i words = _mm256_packs_epi32(reinterpret_cast<__m256i>(first), reinterpret_cast<__m256i>(second));
-  const __m256i bytes = _mm256_packus_epi16(words, words);  // in fours: 0 2, 0 2; 1 3, 1 3
-  const __m256i order = _mm256_setr_epi32(0, 4, 1, 5, 0, 4, 1, 5);
-  _mm_storeu_si128(reinterpret_cast<__m128i*>(p), _mm256_castsi256_si128(_mm256_permutevar8x32_epi32(bytes, order)));
+/// Numbers of 16 bits.
+inline Words narrow(Ints first, Ints second) {
+  const __m256i fours = _mm256_packs_epi32(reinterpret_cast<__m256i>(first), reinterpret_cast<__m256i>(second));
+  return reinterpret_cast<Words>(_mm256_permute4x64_epi64(fours, 0xd8));  // first, second, first, second
+}
+
+/// Of 32 bytes: 0, 2, 4 ... times `even` plus 1, 3, 5 ... times `odd`; from 0 to 127 both.
+inline Words pairs(const std::uint8_t* p, std::int16_t even, std::int16_t odd) {
+  const __m256i factors = _mm256_set1_epi16(static_cast<std::int16_t>(odd << 8 | even));
+  return reinterpret_cast<Words>(
+      _mm256_maddubs_epi16(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(p)), factors));
+}
+
+/// Of 32 bytes 0, 2, 4 ...
+inline Words evens(const std::uint8_t* p) { return load<Words>(p) & std::int16_t{0xff}; }
+
+/// Sixteen numbers from 0 to 255, as bytes.
+inline void store_bytes(std::uint8_t* p, Words numbers) {
+  const auto all = reinterpret_cast<__m256i>(numbers);
+  _mm_storeu_si128(reinterpret_cast<__m128i*>(p),
+                   _mm_packus_epi16(_mm256_castsi256_si128(all), _mm256_extracti128_si256(all, 1)));
 }
 
 inline Floats floats_at(const std::int16_t* p) {
@@ -168,9 +183,59 @@ inline Eight16 words_of(const std::uint8_t* p) {
 }
 inline Words words_at(const std::uint8_t* p) { return {words_of(p), words_of(p + 8)}; }
 
-inline void store_bytes(std::uint8_t* p, const Ints& first, const Ints& second) {
-  store_bytes(p, first);
-  store_bytes(p + 8, second);
+inline Eight16 narrow(const Ints& numbers) {
+#if defined(__SSE2__)
+  return reinterpret_cast<Eight16>(
+      _mm_packs_epi32(reinterpret_cast<__m128i>(numbers.low), reinterpret_cast<__m128i>(numbers.high)));
+#else
+  Eight16 result{};
+  for (int i = 0; i < 4; ++i) {
+    result[i] = static_cast<std::int16_t>(numbers.low[i]);
+    result[i + 4] = static_cast<std::int16_t>(numbers.high[i]);
+  }
+  return result;
+#endif
+}
+inline Words narrow(const Ints& first, const Ints& second) { return {narrow(first), narrow(second)}; }
+
+inline Eight16 eight_pairs(const std::uint8_t* p, std::int16_t even, std::int16_t odd) {
+#if defined(__SSSE3__)
+  const __m128i factors = _mm_set1_epi16(static_cast<std::int16_t>(odd << 8 | even));
+  return reinterpret_cast<Eight16>(_mm_maddubs_epi16(_mm_loadu_si128(reinterpret_cast<const __m128i*>(p)), factors));
+#elif defined(__SSE2__) || defined(__aarch64__)
+  const auto both = load<Eight16>(p);
+  return (both & 0xff) * even + ((both >> 8) & 0xff) * odd;
+#else
+  Eight16 result{};
+  for (int i = 0; i < 8; ++i) result[i] = static_cast<std::int16_t>(p[2 * i] * even + p[2 * i + 1] * odd);
+  return result;
+#endif
+}
+inline Words pairs(const std::uint8_t* p, std::int16_t even, std::int16_t odd) {
+  return {eight_pairs(p, even, odd), eight_pairs(p + 16, even, odd)};
+}
+
+inline Words evens(const std::uint8_t* p) {
+#if defined(__SSE2__) || defined(__aarch64__)
+  return Words{load<Eight16>(p), load<Eight16>(p + 16)} & std::int16_t{0xff};
+#else
+  return pairs(p, 1, 0);
+#endif
+}
+
+inline void store_bytes(std::uint8_t* p, const Words& numbers) {
+#if defined(__SSE2__)
+  _mm_storeu_si128(reinterpret_cast<__m128i*>(p),
+                   _mm_packus_epi16(reinterpret_cast<__m128i>(numbers.low), reinterpret_cast<__m128i>(numbers.high)));
+#elif defined(__aarch64__)
+  vst1q_u8(p, vcombine_u8(vmovn_u16(reinterpret_cast<uint16x8_t>(numbers.low)),
+                          vmovn_u16(reinterpret_cast<uint16x8_t>(numbers.high))));
+#else
+  for (int i = 0; i < 8; ++i) {
+    p[i] = static_cast<std::uint8_t>(numbers.low[i]);
+    p[i + 8] = static_cast<std::uint8_t>(numbers.high[i]);
+  }
+#endif
 }
 
 #if !EAR_HAS_PICK
