@@ -11,6 +11,7 @@ class StampWatch {
   bool add(TimeNs stamp_ns, TimeNs imu_ns);
 
  private:
+  TimeNs last_imu_ns_ = 0;
   int count_ = 0;
   double usual_ = 0.0;   ///< [s]
   double spread_ = 0.0;  ///< [s] mean deviation from it

@@ -11,7 +11,7 @@
 namespace ear {
 namespace {
 
-constexpr int kVotes = 2;        // chosen: readings, for a verdict
+constexpr int kVotes = 2;        // chosen: readings, for a verdict: one may have a false stamp
 constexpr double kReview = 5.0;  // [s] chosen: in which a verdict may be undone
 
 }  // namespace
@@ -35,7 +35,7 @@ void ImuClock::follow(TimeNs driver_ns) {
   if (last_ns_) {
     const double step = seconds_between(*last_ns_, driver_ns);
     if (interval_ == 0.0 && step > 0.0) interval_ = std::min(step, kClockJump);
-    if (std::abs(step - interval_) <= kClockJump) interval_ += (step - interval_) / kClockMemory;
+    if (std::abs(step - interval_) <= kClockJump) interval_ += interval_ / kClockMemory * (step - interval_);
   }
   last_ns_ = driver_ns;
   for (Other& other : others_) other.before_ns = other.newest_ns;
@@ -104,7 +104,8 @@ void ImuClock::settle(bool own_clock) {
 void ImuClock::review(Other& other, TimeNs stamp_ns) {
   const double ahead = seconds_between(*last_ns_ - shift_ns_, stamp_ns);
   if (!corrected_ns_) {
-    other.ahead += (other.newest_ns ? 1.0 / kClockMemory : 1.0) * (ahead - other.ahead);
+    const double passed = other.newest_ns ? seconds_between(*other.newest_ns, stamp_ns) : kClockMemory;
+    other.ahead += std::clamp(passed / kClockMemory, 0.0, 1.0) * (ahead - other.ahead);
     return;
   }
   const double jumped = (ahead - other.ahead) / jump_;

@@ -14,9 +14,11 @@ namespace ear {
 inline constexpr double kClockJump = 0.04;        ///< [s] chosen: either way; less may be a driver that was held up
 inline constexpr double kLargestClockJump = 5.0;  ///< [s] chosen: beyond that it is another clock
 inline constexpr double kJumpShare = 0.5;         ///< chosen: of a jump: readings that are off by less did not jump
-inline constexpr double kClockMemory = 100.0;     ///< chosen: readings
-inline constexpr int kToKnow = 20;                ///< chosen: readings until it is known how they usually come
-inline constexpr int kContradictions = 8;         ///< chosen: readings in a row, to put back what was taken out
+inline constexpr double kClockMemory = 2.0;       ///< [s] chosen: of how readings usually come
+/// Chosen: readings in a row, to put back what was taken out: so many do not all have false stamps, whatever their
+/// rate.
+inline constexpr int kContradictions = 8;
+inline constexpr int kToKnow = 20;  ///< chosen: until that is known: a mean of 20, whatever their rate
 
 /// Of any sensor. `off`: by how much a stamp is off the place where it should be [s].
 [[nodiscard]] inline bool is_clock_jump(double off) {
