@@ -212,6 +212,7 @@ MotionNoise noise_in_motion(const ImuNoise& rest, const std::vector<ImuSample>& 
     std::vector<double>& values = jitter[axis];
     const double middle = upper_median(values);
     std::vector<double> apart;
+    apart.reserve(values.size());
     for (const double value : values) apart.push_back(std::abs(value - middle));
     constexpr double kOfMedian = 1.4826 * 1.2533;  // spread of single ones from median to sigma; of their median
     const double sigma = kOfMedian * upper_median(apart) / std::sqrt(static_cast<double>(values.size()));

@@ -75,7 +75,8 @@ std::vector<std::string> advice_on(const BoardCoverage& coverage, std::size_t ca
   for (std::size_t i = 0; i < cameras; ++i) {
     const std::string camera = "cam" + std::to_string(i);
     if (const std::string names = missing_corners(coverage.corners[i]); !names.empty()) {
-      advice.push_back(camera + ": never in the image's corner " + names + ", where the lens bends most: " + kCorners);
+      advice.push_back(camera + ": never in the image's corner " + names);
+      advice.back().append(", where the lens bends most: ").append(kCorners);
     } else if (coverage.covered[i] < kLeastCovered) {
       advice.push_back(camera + ": only " + std::to_string(std::lround(100.0 * coverage.covered[i])) +
                        " % of the image saw the board: bring it everywhere");

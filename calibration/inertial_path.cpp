@@ -41,11 +41,11 @@ std::vector<InertialPiece> pieces_between(const std::vector<ImuSample>& imu, Tim
 std::vector<PathNode> path_along(const std::vector<InertialPiece>& pieces, const NavState& from) {
   std::vector<PathNode> path;
   if (pieces.empty()) return path;
-  const Eigen::Matrix3d R_kW = from.q_WB.toRotationMatrix().transpose();
-  const Eigen::Vector3d gravity_k = R_kW * kGravity_W;
+  const Eigen::Matrix3d R_KW = from.q_WB.toRotationMatrix().transpose();
+  const Eigen::Vector3d gravity_k = R_KW * kGravity_W;
   PathNode node;
   node.t_ns = pieces.front().from_ns;
-  node.v_kt = R_kW * from.v_W;
+  node.v_kt = R_KW * from.v_W;
   for (const InertialPiece& piece : pieces) {
     node.rate_B = piece.gyro_B - from.b_g;
     path.push_back(node);

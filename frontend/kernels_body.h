@@ -431,7 +431,8 @@ void capture(const GreyLevel& level, const std::array<float, 2>& centre, PatchPi
   constexpr float kOne = static_cast<float>(1 << kBetweenBits);
   const float mean = sum(to_floats(total)) * (1.0F / static_cast<float>(kPatchPixels));
   patch.mean = mean * (1.0F / kOne);
-  const Words less_mean = spread(word(static_cast<int>(mean + 0.5F) - 2));  // to the next, when two bits are cut off
+  const int nearest = static_cast<int>(mean + 0.5F);  // NOLINT(bugprone-incorrect-roundings): mean is not negative
+  const Words less_mean = spread(word(nearest - 2));  // to the next, when two bits are cut off
   for (int row = 0; row < kSize; ++row) {
     const std::int16_t* const in = wide[row + kReach] + kReach;
     const auto at = [&](int further) { return load<Words>(in + further); };
@@ -632,7 +633,7 @@ inline std::uint8_t most_of(const std::uint8_t* centre, std::ptrdiff_t stride) {
     most[i] = greater(static_cast<std::uint8_t>(high - p[0]), static_cast<std::uint8_t>(p[0] - low));
   }
   std::uint8_t largest = 0;
-  for (int i = 0; i < kBlock; ++i) largest = greater(largest, most[i]);
+  for (const std::uint8_t one : most) largest = greater(largest, one);
   return largest;
 }
 

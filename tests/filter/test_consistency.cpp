@@ -2,6 +2,7 @@
 
 #include <doctest/doctest.h>
 
+#include <array>
 #include <cmath>
 #include <random>
 
@@ -12,9 +13,9 @@ using namespace ear::test;
 
 namespace {
 
-constexpr std::size_t I = index_of(MotionSensor::imu);
-constexpr std::size_t O = index_of(MotionSensor::odometer);
-constexpr std::size_t C = index_of(MotionSensor::camera);
+constexpr std::size_t kImu = index_of(MotionSensor::imu);
+constexpr std::size_t kOdometer = index_of(MotionSensor::odometer);
+constexpr std::size_t kCamera = index_of(MotionSensor::camera);
 
 Displacement at(double x, double y, double z, double sigma = 1e-3) {
   return {true, false, {x, y, z}, sigma * sigma * Eigen::Matrix3d::Identity()};
@@ -34,13 +35,13 @@ double between(const Displacement& a, const Displacement& b) { return (a.p_BiBj 
 
 /// (13), (14) written out, in the paper's notation.
 void check_equations(const Displacements& d, const Consistency& result) {
-  const Eigen::Vector3d pI = d[I].p_BiBj, po = d[O].p_BiBj, pc = d[C].p_BiBj;
-  const Eigen::Vector3d mu = (pI + po + pc) / 3.0;
+  const Eigen::Vector3d pi = d[kImu].p_BiBj, po = d[kOdometer].p_BiBj, pc = d[kCamera].p_BiBj;
+  const Eigen::Vector3d mu = (pi + po + pc) / 3.0;
   CHECK(result.variance ==
-        doctest::Approx(((pI - mu).squaredNorm() + (po - mu).squaredNorm() + (pc - mu).squaredNorm()) / 3.0));
-  CHECK(result.coefficient[I] == doctest::Approx((pI - po).norm() + (pI - pc).norm()));
-  CHECK(result.coefficient[O] == doctest::Approx((pI - po).norm() + (pc - po).norm()));
-  CHECK(result.coefficient[C] == doctest::Approx((pc - po).norm() + (pI - pc).norm()));
+        doctest::Approx(((pi - mu).squaredNorm() + (po - mu).squaredNorm() + (pc - mu).squaredNorm()) / 3.0));
+  CHECK(result.coefficient[kImu] == doctest::Approx((pi - po).norm() + (pi - pc).norm()));
+  CHECK(result.coefficient[kOdometer] == doctest::Approx((pi - po).norm() + (pc - po).norm()));
+  CHECK(result.coefficient[kCamera] == doctest::Approx((pc - po).norm() + (pi - pc).norm()));
 }
 
 }  // namespace
@@ -77,14 +78,15 @@ TEST_CASE("consistency: (13) to (15) as they stand in the paper") {
     const Consistency result = symmetric(d);
     check_equations(d, result);
     if (!result.anomalous) continue;
-    const double Io = between(d[I], d[O]), Ic = between(d[I], d[C]), co = between(d[C], d[O]);
+    const double Io = between(d[kImu], d[kOdometer]), Ic = between(d[kImu], d[kCamera]),
+                 co = between(d[kCamera], d[kOdometer]);
     const std::size_t X = index_of(*result.anomalous);
-    const double expected_symmetric = X == I   ? co / (2 * Io) + co / (2 * Ic)
-                                      : X == O ? Ic / (2 * Io) + Ic / (2 * co)
-                                               : Io / (2 * Ic) + Io / (2 * co);
-    const double expected_printed = X == I   ? co / (2 * Io) + Ic / (2 * Ic)
-                                    : X == O ? Ic / (2 * Io) + Io / (2 * co)
-                                             : co / (2 * Ic) + Io / (2 * Ic);
+    const double expected_symmetric = X == kImu        ? co / (2 * Io) + co / (2 * Ic)
+                                      : X == kOdometer ? Ic / (2 * Io) + Ic / (2 * co)
+                                                       : Io / (2 * Ic) + Io / (2 * co);
+    const double expected_printed = X == kImu        ? co / (2 * Io) + Ic / (2 * Ic)
+                                    : X == kOdometer ? Ic / (2 * Io) + Io / (2 * co)
+                                                     : co / (2 * Ic) + Io / (2 * Ic);
     CHECK(result.weight[X] == doctest::Approx(std::clamp(expected_symmetric, 0.05, 1.0)));
     CHECK(printed(d).weight[X] == doctest::Approx(std::clamp(expected_printed, 0.05, 1.0)));
   }
@@ -119,7 +121,7 @@ TEST_CASE("consistency: two that are equal leave the third its least weight") {
   const ConsistencyCheck check(with(AnomalyScore::distance));
   const Consistency result = check({at(0.1, 0, 0), at(0.1, 0, 0), at(0.2, 0, 0)});
   CHECK(result.anomalous == MotionSensor::camera);
-  CHECK(result.weight[C] == 0.05);
+  CHECK(result.weight[kCamera] == 0.05);
   CHECK_FALSE(check({at(0.1, 0, 0), at(0.1, 0, 0), at(0.1, 0, 0)}).disagree());
 }
 
@@ -134,7 +136,7 @@ TEST_CASE("consistency: sensors that are right are suspected as often as the fal
   config.false_alarm = 0.02;
   const ConsistencyCheck check(config);
   std::mt19937_64 rng{62};
-  const double pairs[] = {0.001, 0.004, 0.0005};
+  const std::array<double, 3> pairs = {0.001, 0.004, 0.0005};
   constexpr int kDraws = 20000;
   int alarms_of_three = 0, alarms_of_two = 0;
   for (int draw = 0; draw < kDraws; ++draw) {

@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 #include <random>
@@ -179,18 +180,16 @@ TEST_CASE("kernels: rows of a singular sum, the largest pivot first") {
 }
 
 struct Equations {
-  MatrixXd A[2] = {MatrixXd::Zero(6, 6), MatrixXd::Zero(6, 6)};
-  VectorXd b[2] = {VectorXd::Zero(6), VectorXd::Zero(6)};
+  std::array<MatrixXd, 2> A = {MatrixXd::Zero(6, 6), MatrixXd::Zero(6, 6)};
+  std::array<VectorXd, 2> b = {VectorXd::Zero(6), VectorXd::Zero(6)};
   int fitting = 0;
-  bool operator==(const Equations& o) const {
-    return A[0] == o.A[0] && A[1] == o.A[1] && b[0] == o.b[0] && b[1] == o.b[1] && fitting == o.fitting;
-  }
+  bool operator==(const Equations& o) const { return A == o.A && b == o.b && fitting == o.fitting; }
 };
 
 /// A feature as it stands in a table: nine numbers, of which the last one's first byte says whether the right camera
 /// sees it in frame 1.
 struct Feature {
-  double seen[8];
+  std::array<double, 8> seen;
   bool has_right1;
 };
 
@@ -202,7 +201,7 @@ Equations expected_equations(const std::vector<Feature>& features, const StereoP
     return Eigen::Vector3d(R * ray + s * Eigen::Map<const Eigen::Vector3d>(T.p));
   };
   for (const Feature& feature : features) {
-    const Eigen::Map<const VectorXd> seen(feature.seen, 8);
+    const Eigen::Map<const VectorXd> seen(feature.seen.data(), 8);
     const Eigen::Vector3d ray = Eigen::Vector2d(seen.head<2>()).homogeneous();
     const Eigen::Vector3d a = taken(problem.right0, ray, 0.0);
     const Eigen::Map<const Eigen::Vector3d> p(problem.right0.p);
@@ -248,23 +247,22 @@ TEST_CASE("kernels: a step of the motion between stereo images") {
       const Eigen::Vector3d p = Eigen::Vector3d(normal(rng), normal(rng), 4.0 + normal(rng)) * 0.5;
       const double noise = 0.015;
       const double wrong = normal(rng) > 1.5 ? -0.3 : 0.0;  // some seem behind the cameras
-      const double values[8] = {p.x() / p.z(),
-                                p.y() / p.z(),
-                                (p.x() + problem.right0.p[0]) / p.z() - wrong,
-                                p.y() / p.z(),
-                                p.x() / p.z() + noise * normal(rng),
-                                p.y() / p.z() + noise * normal(rng),
-                                (p.x() - 0.1) / p.z() + noise * normal(rng),
-                                p.y() / p.z() + noise * normal(rng)};
-      std::copy(values, values + 8, f.seen);
+      f.seen = {p.x() / p.z(),
+                p.y() / p.z(),
+                (p.x() + problem.right0.p[0]) / p.z() - wrong,
+                p.y() / p.z(),
+                p.x() / p.z() + noise * normal(rng),
+                p.y() / p.z() + noise * normal(rng),
+                (p.x() - 0.1) / p.z() + noise * normal(rng),
+                p.y() / p.z() + noise * normal(rng)};
       f.has_right1 = normal(rng) > -1.0;
     }
-    const StereoTable table{features.front().seen, sizeof(Feature) / sizeof(double), &features.front().has_right1,
-                            static_cast<int>(count)};
+    const StereoTable table{features.front().seen.data(), sizeof(Feature) / sizeof(double),
+                            &features.front().has_right1, static_cast<int>(count)};
     const Equations found = by_all([&](const FilterKernels& kernels) {
-      StereoSums sums[2];
+      std::array<StereoSums, 2> sums;
       Equations equations;
-      equations.fitting = kernels.add_stereo(table, problem, sums);
+      equations.fitting = kernels.add_stereo(table, problem, sums.data());
       for (int camera = 0; camera < 2; ++camera) {
         const double* entry = sums[camera].A;
         for (int j = 0; j < 6; ++j) {

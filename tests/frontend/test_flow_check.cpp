@@ -1,6 +1,7 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <random>
 
 #include "frontend/flow_check.h"
@@ -142,7 +143,7 @@ TEST_CASE("flow check: what stands still in the image of a camera that turns is 
     std::vector<Flow> flows;
     for (int i = 0; i < number; ++i) {
       Flow flow;
-      flow.x0 = Eigen::Vector2d(0.1 * (i % 8) - 0.3, 0.1 + 0.05 * (i / 8));
+      flow.x0 = Eigen::Vector2d(0.1 * (i % 8) - 0.3, 0.1 + 0.05 * std::floor(i / 8.0));
       flow.x1 = flow.x0 + Eigen::Vector2d(0.1 * kPixel, 0.0);
       flows.push_back(flow);
     }

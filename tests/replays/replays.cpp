@@ -4,12 +4,12 @@
 // All fifteen sequences at one seed, with all sensors and by cameras and IMU alone, some with faults and some with a
 // calibration error (without one the errors are of fixed sizes). A run's digest is of every bit of every estimate: it
 // may differ where another compiler rounds otherwise, and is shown only. Positions must agree within kTolerance.
-#include <cinttypes>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
 #include <cstring>
 #include <fstream>
+#include <iomanip>
 #include <iostream>
 #include <iterator>
 #include <optional>
@@ -112,9 +112,9 @@ void replay(const Run& run, std::ostream& out) {
   experiments::ReplayOptions replay_options;
   replay_options.wheels = run.wheels;
   experiments::replay(simulation, filter, add, replay_options);
-  char hex[17];
-  std::snprintf(hex, sizeof(hex), "%016" PRIx64, digest.value());
-  out << run.name() << ' ' << count << ' ' << hex << '\n' << positions.str();
+  out << run.name() << ' ' << count << ' ' << std::hex << std::setfill('0') << std::setw(16) << digest.value()
+      << std::dec << '\n'
+      << positions.str();
 }
 
 /// How far two rows of numbers are apart; infinity if they are no such rows, or their times differ.

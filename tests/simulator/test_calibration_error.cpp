@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -50,7 +51,7 @@ void add_differences(const ear::Calibration& truth, const ear::Calibration& give
   const Eigen::Isometry3d true_pair = T_BC.inverse() * truth.cameras[1].T_BC;
   add(draws["stereo rotation [deg]"], turned(true_pair.linear(), given_pair.linear()));
   add(draws["stereo position [mm]"], 1e3 * (given_pair.translation() - true_pair.translation()));
-  const std::string sides[] = {"left ", "right "};
+  const std::array<std::string, 2> sides = {"left ", "right "};
   for (std::size_t i = 0; i < 2; ++i) {
     const ear::CameraCalibration& a = truth.cameras[i];
     const ear::CameraCalibration& b = given.cameras[i];

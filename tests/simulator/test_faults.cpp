@@ -165,8 +165,7 @@ TEST_CASE("faults: frozen counts stay, then go on as if nothing had been") {
     CHECK(change.inside > 0.99 * change.samples_inside);
     std::int64_t left = 0;
     std::int64_t right = 0;
-    for (std::size_t i = 0; i < faulty.encoders().size(); ++i) {
-      const EncoderSample& sample = faulty.encoders()[i];
+    for (const EncoderSample& sample : faulty.encoders()) {
       const double t = motion_time(sample.t_ns);
       if (t < 5.0) {
         left = sample.left_count;

@@ -54,8 +54,8 @@ struct Scene {
     const ImagingBlock values = imaging_block(imaging);
     std::vector<Eigen::VectorXd> result = {block(T_WB), block(cameras.T_BC0)};
     if (with_right) result.push_back(block(cameras.T_C0C1));
-    result.push_back(Eigen::Map<const Eigen::VectorXd>(values.data(), 7));
-    result.push_back(Eigen::Map<const Eigen::VectorXd>(point.data(), 3));
+    result.emplace_back(Eigen::Map<const Eigen::VectorXd>(values.data(), 7));
+    result.emplace_back(Eigen::Map<const Eigen::VectorXd>(point.data(), 3));
     return result;
   }
 };
