@@ -32,7 +32,7 @@ CommonEstimator::CommonEstimator(const FilterConfig& config, const Calibration& 
       sources_(config, calibration),
       start_(config, calibration),
       consistency_check_(config.anomaly),
-      health_(calibration, sources_.uses_wheels(), uses_beams) {}
+      health_(config.odometer, calibration, sources_.uses_wheels(), uses_beams) {}
 
 void CommonEstimator::succeed(CommonEstimator& before, TimeNs t_ns, TimeNs clock_shift) {
   before.ingest_.restart();
@@ -91,6 +91,9 @@ void CommonEstimator::add_encoder(const EncoderSample& sample) {
   if (taken.verdict != Verdict::accepted || !taken.increment) return;
   note(sources_.watch_contact(*taken.increment, ekf_));
   sources_.standstill().add(*taken.increment);
+  if (ekf_.running() && sources_.on_ground()) {
+    health_.add_increment(*taken.increment, ingest_.imu(), ekf_.state().imu.b_g);
+  }
   if (const auto due_ns = ingest_.due_before(*taken.increment, ekf_.running())) make_room(*due_ns);
   ingest_.push(*taken.increment);
 }

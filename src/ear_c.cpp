@@ -218,6 +218,7 @@ void write_health(const ear::Health& from, ear_health& to) {
   to.reset_counter = from.reset_counter;
   to.load_step = from.load_step;
   to.imprecise = from.imprecise ? 1 : 0;
+  to.misaligned = from.misaligned ? 1 : 0;
   for (std::size_t i = 0; i < ear::kSourceCount; ++i) to.score[i] = from.sources[i].score;
 }
 

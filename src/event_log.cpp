@@ -53,8 +53,8 @@ void EventLog::note_unusable(TimeNs t_ns, const std::string& reason) {
 void EventLog::note_health(TimeNs t_ns, const Health& health) {
   const bool same = health.status == written_.status && health.reason == written_.reason &&
                     health.faulty == written_.faulty && health.aiding == written_.aiding &&
-                    health.imprecise == written_.imprecise && health.load_step == written_.load_step &&
-                    health.reset_counter == written_.reset_counter;
+                    health.imprecise == written_.imprecise && health.misaligned == written_.misaligned &&
+                    health.load_step == written_.load_step && health.reset_counter == written_.reset_counter;
   if (same) return;
   const std::string text = to_text(health);
   const auto before = states_.find(text);

@@ -94,7 +94,13 @@ std::string to_text(const Health& health) {
     text += separator + std::string(kSourceNames[source]);
     separator = ", ";
   }
-  if (health.imprecise) text += std::string(health.faulty.any() ? ", " : ": ") + "position imprecise";
+  separator = health.faulty.any() ? ", " : ": ";
+  if (health.imprecise) {
+    text += separator + std::string("position imprecise");
+    separator = ", ";
+  }
+  if (health.misaligned)
+    text += separator + std::string("wheels and inertial sensors disagree about where forward or left is");
   return text + "; carried by " + to_text(health.aiding);
 }
 

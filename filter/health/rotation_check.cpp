@@ -9,7 +9,6 @@ namespace ear {
 namespace {
 
 constexpr double kTurnOff = 0.012;      // [rad/s] chosen: between gyroscope and cameras
-constexpr double kTurnSigmas = 4.0;     // chosen
 constexpr double kTurnMemory = 0.25;    // [s] chosen
 constexpr double kScatterMemory = 2.0;  // [s] chosen
 constexpr double kMostScatter = 0.1;    // [rad/s] chosen
@@ -29,7 +28,7 @@ void RotationCheck::add(const FrameAgreement& seen, double interval, bool wheels
   scatter_ += scatter_share * (off * off - scatter_);
   rate_ += share * (rate - rate_);
   apparent_ += share * (seen.apparent_rate - apparent_);
-  const double by_chance = kTurnSigmas * std::sqrt(0.5 * share * scatter_);
+  const double by_chance = kClear * std::sqrt(0.5 * share * scatter_);
   differs_ = known && rate_.norm() > std::max(kTurnOff, by_chance) + apparent_;
 }
 

@@ -10,7 +10,6 @@
 namespace ear {
 namespace {
 
-constexpr double kMemory = 100.0;  // [s] chosen: of the interval, which a crystal keeps, and of what fits
 constexpr double kHeldUp = 10.0;   // [s] chosen: no driver is held up so long; measured: 6 s
 constexpr double kSure = 3.0;      // chosen: standard deviations
 
@@ -42,7 +41,7 @@ void EvenClock::compare(const WheelIncrement& increment, double intervals) {
     const Eigen::Vector2d one = angle_ / intervals_;
     const Eigen::Vector2d x = (dt / interval_ - intervals) * one;
     const Eigen::Vector2d y = increment.angle - intervals * one;
-    const double kept = std::exp(-dt / kMemory);
+    const double kept = std::exp(-dt / kSlopeMemory);
     Regression& r = regression_;
     r = {kept * r.xx + x.squaredNorm(), kept * r.xy + x.dot(y), kept * r.yy + y.squaredNorm(), kept * r.count + 1.0};
   }
@@ -63,7 +62,7 @@ void EvenClock::follow(const WheelIncrement& increment, double intervals) {
   }
   const double dt = increment.duration();
   const double step = is_even() ? seconds_between(before_ns, even_ns_) : dt;
-  interval_ += std::max(dt / kMemory, 1.0 / (count_ += 1.0)) * (step / intervals - interval_);
+  interval_ += std::max(dt / kSlopeMemory, 1.0 / (count_ += 1.0)) * (step / intervals - interval_);
 }
 
 void EvenClock::correct(WheelIncrement& increment) {

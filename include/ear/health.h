@@ -14,7 +14,7 @@ namespace ear {
 enum class HealthStatus : std::uint8_t {
   initialising,  ///< there was no estimate yet
   tracking,      ///< no sensor is faulty; some may be rightly silent, as wheels are in flight
-  degraded,      ///< the estimate may be used, but rests on fewer sensors than it should, or is imprecise
+  degraded,      ///< the estimate may be used, but rests on fewer sensors than it should, is imprecise, or misaligned
   lost           ///< there was an estimate; now it may be anywhere, and none is given
 };
 
@@ -93,6 +93,7 @@ struct Health {
   SourceSet faulty;                  ///< sources that the estimate should rest on, and does not
   std::array<TimeNs, kSourceCount> onset_ns{};  ///< of these: since when
   bool imprecise = false;          ///< two standard deviations of the position are more than 5 % of the path and 0.1 m
+  bool misaligned = false;         ///< wheels and inertial sensors disagree about where forward or left is
   Aiding aiding = Aiding::none;    ///< what is left
   int quality = 0;                 ///< 0 (lost) ... 100
   double horizontal_sigma = 0.0;   ///< [m] standard deviation of the position since the start, in the worst direction

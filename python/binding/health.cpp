@@ -64,7 +64,7 @@ void bind_health(py::module_& module) {
              Field{"score", &R::score});
   py::class_<Health> health(module, "Health", "What the estimator reports of itself; str() says it in words.");
   health.attr("_fields") =
-      py::make_tuple("status", "reason", "since_ns", "faulty", "onset_ns", "imprecise", "aiding", "quality",
+      py::make_tuple("status", "reason", "since_ns", "faulty", "onset_ns", "imprecise", "misaligned", "aiding", "quality",
                      "horizontal_sigma", "vertical_sigma", "reset_counter", "load_step", "sources");
   health.def_readonly("status", &Health::status)
       .def_readonly("reason", &Health::reason)
@@ -84,6 +84,7 @@ void bind_health(py::module_& module) {
                                });
                              })
       .def_readonly("imprecise", &Health::imprecise)
+      .def_readonly("misaligned", &Health::misaligned)
       .def_readonly("aiding", &Health::aiding)
       .def_readonly("quality", &Health::quality)
       .def_readonly("horizontal_sigma", &Health::horizontal_sigma)

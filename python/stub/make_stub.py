@@ -57,6 +57,7 @@ FIELDS = {
     "SourceRecord.rejected": "int", "SourceRecord.score": "float",
     "faulty": "tuple[str, ...]", "onset_ns": "dict[str, int]", "sources": "dict[str, SourceRecord]",
     "Health.status": "HealthStatus", "Health.reason": "Reason", "Health.since_ns": "int", "Health.imprecise": "bool",
+    "Health.misaligned": "bool",
     "Health.aiding": "Aiding", "Health.quality": "int", "Health.horizontal_sigma": "float",
     "Health.vertical_sigma": "float", "Health.reset_counter": "int", "Health.load_step": "int", "Health.reason_text": "str",
     "Recording.calibration": "Calibration", "Recording.span": "tuple[int, int]", "Recording.warnings": "tuple[Warning, ...]",

@@ -1,0 +1,116 @@
+#include "filter/health/mounting_watch.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+#include "filter/ekf/state.h"
+#include "filter/health/rotation_check.h"
+#include "filter/ingest/even_clock.h"
+#include "filter/ingest/silence.h"
+#include "filter/ingest/stream_clock.h"
+
+namespace ear {
+
+MountingWatch::Gained& MountingWatch::Gained::add(const Gained& other, double weight) {
+  inertial += weight * other.inertial;
+  for (std::size_t i = 0; i < 2; ++i) wheels[i] += weight * other.wheels[i];
+  return *this;
+}
+
+MountingWatch::MountingWatch(const OdometerConfig& config, const EncoderCalibration& encoder)
+    : still_(config.speed_sigma),
+      radius_(0.5 * (encoder.wheel_radius[0] + encoder.wheel_radius[1])),
+      track_width_(encoder.track_width),
+      R_OB_(encoder.T_BO.linear().transpose()) {}
+
+void MountingWatch::restart(TimeNs t_ns) {
+  end_ns_ = t_ns;
+  duration_ = 0.0;
+  tilt_.setZero();
+  turned_.setZero();
+  gained_ = sum_ = Gained{};
+  windows_ = 0;
+}
+
+void MountingWatch::add(const WheelIncrement& increment, const ImuBuffer& imu, const Eigen::Vector3d& b_g) {
+  if (increment.duration() <= 0.0) return;
+  if (increment.from_ns != end_ns_ || increment.duration() > kStreamGap) restart(increment.from_ns);
+  end_ns_ = increment.to_ns;
+  const double speed = radius_ * increment.angle.mean() / increment.duration();
+  const double left_turn = radius_ * (increment.angle(1) - increment.angle(0)) / track_width_;
+  double duration = 0.0, turn = 0.0;
+  const double gravity = kGravity_W.norm();
+  imu.for_each_piece(increment.from_ns, increment.to_ns,
+                     [&](const Eigen::Vector3d& gyro_B, const Eigen::Vector3d& accel_B, double dt) {
+                       const Eigen::Vector3d rate = R_OB_ * (gyro_B - b_g), force = R_OB_ * accel_B;
+                       tilt_ += dt * rate.head<2>();
+                       // What is measured of gravity: backwards with the nose down, left when it rolls right.
+                       gained_.inertial +=
+                           dt * std::complex<double>(force.x() + gravity * tilt_.y(), force.y() - gravity * tilt_.x());
+                       gained_.wheels[0] = speed;
+                       gained_.wheels[1] += dt * speed * rate.z();
+                       sum_.add(gained_, dt);
+                       duration += dt;
+                       turn += dt * rate.z();
+                     });
+  duration_ += duration;
+  turned_ += Eigen::Vector2d(left_turn, turn);
+  if (duration_ >= 2.0 * kStreamGap) close_window();
+}
+
+/// How the mean velocity changed from window to window, less how it changed before: a tilt that stays drops out.
+void MountingWatch::close_window() {
+  Gained mean;
+  mean.add(sum_, 1.0 / duration_);
+  Gained change = mean;
+  change.add(means_[1], -2.0).add(means_[0], 1.0);
+  const double kept = std::exp(-duration_ / kSlopeMemory);
+  if (windows_ >= 2 && std::hypot(change.wheels[0], change.wheels[1]) > still_) {
+    const Eigen::Vector2cd x(change.wheels[0], std::complex<double>(0.0, change.wheels[1]));
+    Regression& r = regression_;
+    r.xx = kept * r.xx + x.conjugate() * x.transpose();
+    r.xy = kept * r.xy + x.conjugate() * change.inertial;
+    r.yy = kept * r.yy + std::norm(change.inertial);
+    r.count = kept * r.count + 1.0;
+  }
+  if (turned_.norm() * track_width_ > still_ * duration_) {
+    const double w = turned_(0), g = turned_(1);
+    Turns& t = turns_;
+    t = {kept * t.gg + g * g, kept * t.gw + g * w, kept * t.ww + w * w, kept * t.count + 1.0};
+  }
+  means_ = {means_[1], mean};
+  ++windows_;
+  sum_ = Gained{};
+  duration_ = 0.0;
+  turned_.setZero();
+  contradicts_ = forwards_apart() || turns_apart();
+}
+
+/// Slopes are 1 where all is well, and less where wheels slip, but never backwards. Half of it or more to a side: axes
+/// are exchanged.
+bool MountingWatch::forwards_apart() const {
+  const Regression& r = regression_;
+  if (r.count < kToKnow) return false;
+  // What never changed is not known: its slope has the standard deviation that so little gives.
+  const Eigen::Matrix2cd inverse = (r.xx + still_ * still_ * Eigen::Matrix2cd::Identity()).inverse();
+  const Eigen::Vector2cd slopes = inverse * r.xy;
+  const double variance = std::max(0.0, r.yy - r.xy.dot(slopes).real()) / (2.0 * (r.count - 2.0));
+  for (Eigen::Index i = 0; i < 2; ++i) {
+    const std::complex<double> slope = slopes(i);
+    const double doubt = kClear * std::sqrt(variance * inverse(i, i).real());
+    if (slope.real() + doubt < 0.0 || std::abs(slope.imag()) - doubt > std::max(0.5, slope.real())) return true;
+  }
+  return false;
+}
+
+/// The slope of the wheels' turns on the gyroscope's: wheels that scrub turn more, never against it.
+bool MountingWatch::turns_apart() const {
+  const Turns& t = turns_;
+  if (t.count < kToKnow || t.gg <= 0.0) return false;
+  const double slope = t.gw / t.gg;
+  const double sigma = std::sqrt(std::max(0.0, t.ww - slope * t.gw) / (t.count - 1.0) / t.gg);
+  return slope + kClear * sigma < 0.0;
+}
+
+}  // namespace ear
