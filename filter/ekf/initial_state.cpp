@@ -40,6 +40,7 @@ void require_sigmas(const Calibration& calibration) {
   if (const auto& encoder = calibration.encoder) {
     require(encoder->stamp_sigma >= 0.0 && std::isfinite(encoder->stamp_sigma),
             "calibration: the encoder's stamp_sigma must not be negative");
+    require_sigma(encoder->time_offset_sigma, "calibration: the encoder's time_offset_sigma must be positive");
     require_sigma(encoder->T_BO_sigma, "calibration: T_BO_sigma must be positive");
     require_sigma(encoder->wheel_radius_sigma, "calibration: wheel_radius_sigma must be positive");
     require_sigma(encoder->wheel_radius_difference_sigma,
@@ -47,6 +48,7 @@ void require_sigmas(const Calibration& calibration) {
     require_sigma(encoder->track_width_sigma, "calibration: track_width_sigma must be positive");
   }
   if (calibration.lasers) {
+    require_sigma(calibration.lasers->time_offset_sigma, "calibration: the lasers' time_offset_sigma must be positive");
     require_sigma(calibration.lasers->offset_sigma, "calibration: a laser's offset_sigma must be positive");
   }
 }
@@ -79,6 +81,10 @@ const Calibration& checked(const Calibration& calibration) {
   }
   require(std::abs(calibration.camera_time_offset) <= kLargestTimeOffset,
           "calibration: camera_time_offset must be a number of seconds, at most an hour");
+  require(!calibration.encoder || std::abs(calibration.encoder->time_offset) <= kLargestTimeOffset,
+          "calibration: the encoder's time_offset must be a number of seconds, at most an hour");
+  require(!calibration.lasers || std::abs(calibration.lasers->time_offset) <= kLargestTimeOffset,
+          "calibration: the lasers' time_offset must be a number of seconds, at most an hour");
   require(calibration.imu.gyro_noise > 0.0 && calibration.imu.accel_noise > 0.0,
           "calibration: imu noise must be positive");
   if (const auto& encoder = calibration.encoder) {
