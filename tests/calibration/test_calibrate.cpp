@@ -2,16 +2,11 @@
 #include <cmath>
 #include <random>
 #include <string>
-#include <tuple>
 #include <unordered_map>
 #include <utility>
 #include <vector>
 
 #include "tests/smoother/support.h"
-// After that one.
-#include "src/recording/calibration_files.h"
-#include "tests/recording/support.h"
-#include "tools/calibration/result_files.h"
 #include "tools/calibration/simulated_drive.h"
 
 using namespace ear;
@@ -186,44 +181,6 @@ TEST_CASE("calibrate: errors that last as long as a track are told from the resi
   MESSAGE("errors that last: " << result.noise.lasting << " times, mean squared normalized error " << squares / count);
   CHECK(result.noise.lasting > 1.4);
   CHECK(squares / count < 2.0);
-}
-
-TEST_CASE("calibrate: clocks of wheels and lasers are found from where they were given, written, and read back") {
-  simulator::Options options;
-  options.sequence = "calibrate";
-  options.seed = 13;
-  options.camera_rate_hz = 5.0;
-  options.calibration_error = 1.0;
-  const simulator::Simulation simulation(options);
-  Drive drive = recorded_drive(simulation);
-  for (EncoderSample& sample : drive.encoders) sample.t_ns -= 80'000'000;
-  for (LaserSample& sample : drive.lasers) sample.t_ns += 40'000'000;
-  Calibration given = simulation.calibration();
-  given.encoder->time_offset = 0.077;
-  given.lasers->time_offset = -0.037;
-  const Priors priors = drawn_priors(1.0);
-  Settings settings;
-  settings.rounds = 1;
-  const SimulatedCalibration made{calibrate(given, priors, {drive}, settings), {}};
-  for (const auto& [name, told, right] :
-       {std::tuple("encoder0: time offset", 77.0, 80.0), std::tuple("laser0: time offset", -37.0, -40.0)}) {
-    const Finding& clock = finding(made, name);
-    CAPTURE(clock.name);
-    CHECK(clock.shown);
-    CHECK(clock.given == doctest::Approx(told));
-    CHECK(std::abs(clock.given + clock.change - right) < 4.5 * clock.posterior);
-    CHECK(clock.posterior < 0.5);
-  }
-  const test::TempFolder folder;
-  const std::string text = write_result(made.result, folder.path());
-  CHECK(text.find("stamps") == std::string::npos);
-  Warnings warnings;
-  const Calibration back = load_calibration(folder.path(), {}, warnings, CalibrationKind::alone);
-  CHECK(back.encoder->time_offset == doctest::Approx(made.result.calibration.encoder->time_offset));
-  CHECK(back.encoder->time_offset_sigma == doctest::Approx(*made.result.calibration.encoder->time_offset_sigma));
-  CHECK(std::abs(back.encoder->time_offset - 0.08) < 0.001);
-  CHECK(std::abs(back.lasers->time_offset + 0.04) < 0.001);
-  CHECK(priors_of(back).laser_time == doctest::Approx(1e-3 * finding(made, "laser0: time offset").posterior));
 }
 
 TEST_CASE("calibrate: no estimate is an error in words") {

@@ -355,7 +355,7 @@ TEST_CASE("filter: settings and calibrations that cannot be are refused by name"
 }
 
 TEST_CASE("filter: wheels and lasers whose stamps are off by what the calibration says give the same estimates") {
-  const simulator::Simulation simulation = simulate("waves1", 15.0, false);
+  const simulator::Simulation simulation = simulate("wave1", 15.0, false);
   const auto run = [&](TimeNs encoder_ns, TimeNs laser_ns, double encoder_offset, double laser_offset) {
     Calibration calibration = simulation.calibration();
     calibration.encoder->time_offset = encoder_offset;
