@@ -117,13 +117,13 @@ void Batch::add_blocks() {
     }
     if (!segment.drive->reference.empty()) problem_->AddParameterBlock(segment.reference.data(), 4);
   }
-  for (const ParameterBlock& block : blocks_) {
+  for (const CalibrationBlock& block : blocks_) {
     problem_->AddParameterBlock(block.data, static_cast<int>(block.entries.size()));
   }
 }
 
 void Batch::add_priors() {
-  for (const ParameterBlock& block : blocks_) {
+  for (const CalibrationBlock& block : blocks_) {
     const auto n = static_cast<Eigen::Index>(block.entries.size());
     Eigen::MatrixXd A = Eigen::MatrixXd::Zero(n, n);
     for (Eigen::Index k = 0; k < n; ++k) A(k, k) = 1.0 / block.entries[static_cast<std::size_t>(k)].prior;

@@ -60,7 +60,7 @@ class Batch {
   /// From the next build() on, features count with `lasting` times the noise that they count with now.
   void weigh_pixels(double lasting) { noise_.lasting *= lasting; }
 
-  [[nodiscard]] const std::vector<ParameterBlock>& parameter_blocks() const { return blocks_; }
+  [[nodiscard]] const std::vector<CalibrationBlock>& parameter_blocks() const { return blocks_; }
   [[nodiscard]] const Parameters& parameters() const { return parameters_; }
   [[nodiscard]] Parameters& parameters() { return parameters_; }
   [[nodiscard]] const Calibration& given() const { return given_; }
@@ -92,7 +92,7 @@ class Batch {
   Noise noise_;
   GivenCameras cameras_;
   Parameters parameters_;
-  std::vector<ParameterBlock> blocks_;
+  std::vector<CalibrationBlock> blocks_;
   std::vector<Segment> segments_;
   std::vector<TermBlock> terms_;
   std::unique_ptr<ceres::Problem> problem_;

@@ -68,7 +68,7 @@ std::vector<double*> Batch::elimination_order() {
     }
     if (!segment.drive->reference.empty()) order.push_back(segment.reference.data());
   }
-  for (const ParameterBlock& block : blocks_) order.push_back(block.data);
+  for (const CalibrationBlock& block : blocks_) order.push_back(block.data);
   return order;
 }
 

@@ -23,7 +23,8 @@ struct BoardShape {
   [[nodiscard]] int corners() const { return (columns - 1) * (rows - 1); }
   /// On the board [m].
   [[nodiscard]] Eigen::Vector2d at(int corner) const {
-    return {square * (1 + corner % (columns - 1)), square * (1 + corner / (columns - 1))};
+    const int across = corner % (columns - 1), down = corner / (columns - 1);
+    return {square * (1 + across), square * (1 + down)};
   }
 };
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <string>
+#include <utility>
 
 namespace ear::calibration {
 namespace {
@@ -75,8 +77,12 @@ std::vector<std::string> advice_on(const BoardCoverage& coverage, std::size_t ca
   for (std::size_t i = 0; i < cameras; ++i) {
     const std::string camera = "cam" + std::to_string(i);
     if (const std::string names = missing_corners(coverage.corners[i]); !names.empty()) {
-      advice.push_back(camera + ": never in the image's corner " + names);
-      advice.back().append(", where the lens bends most: ").append(kCorners);
+      std::string words = camera;
+      words.append(": never in the image's corner ")
+          .append(names)
+          .append(", where the lens bends most: ")
+          .append(kCorners);
+      advice.push_back(std::move(words));
     } else if (coverage.covered[i] < kLeastCovered) {
       advice.push_back(camera + ": only " + std::to_string(std::lround(100.0 * coverage.covered[i])) +
                        " % of the image saw the board: bring it everywhere");

@@ -19,9 +19,9 @@ constexpr double kLasting = 1.1;  // of the features' errors, from which on they
 constexpr double kLeftOut = 4.0;  // [s] of a drive: standing before the start
 constexpr double kLate = 5e-3;    // [s] of the cameras' clock: further, the body does not turn at an even rate
 
-std::vector<Entry> all_entries(const std::vector<ParameterBlock>& blocks) {
+std::vector<Entry> all_entries(const std::vector<CalibrationBlock>& blocks) {
   std::vector<Entry> entries;
-  for (const ParameterBlock& block : blocks) {
+  for (const CalibrationBlock& block : blocks) {
     entries.insert(entries.end(), block.entries.begin(), block.entries.end());
   }
   return entries;

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 
 #include "calibration/bridge.h"
 #include "calibration/lens.h"
@@ -17,6 +18,7 @@ namespace {
 constexpr double kLongestGap = 1.0;  // [s] between two states of one piece
 constexpr double kBridged = 12.0;    // [s] that inertial samples alone tell how it moved: a hop without cameras
 constexpr double kShortest = 5.0;    // [s] of a piece
+constexpr double kWhole = 0.8;       // of a drive: a piece that is shorter was lost
 constexpr TimeNs kTolerance = 5'000'000;
 
 /// The ray that `now` sees where `given` saw `ray`: Newton's iteration on the pixel.
@@ -115,24 +117,41 @@ void keep_longest(std::vector<GuessedState>& states) {
   states.erase(states.begin(), states.begin() + static_cast<std::ptrdiff_t>(best));
 }
 
+/// From the first state to the last [s].
+double length_of(const std::vector<GuessedState>& states) {
+  return states.empty() ? 0.0 : seconds_between(states.front().state.t_ns, states.back().state.t_ns);
+}
+
+/// The longest piece of what the filter makes of the drive. An image's time may be after the last inertial sample.
+std::vector<GuessedState> longest_piece(const Drive& drive, const Calibration& given, const Calibration& now,
+                                        const FilterConfig& config, double interval) {
+  std::vector<GuessedState> states = Feed(drive, given, now, config, interval).run();
+  while (!states.empty() && states.back().state.t_ns > drive.imu.back().t_ns) states.pop_back();
+  if (given.cameras.empty()) states = bridge_gaps(states, drive.imu, interval, kLongestGap, kBridged);
+  keep_longest(states);
+  return states;
+}
+
 }  // namespace
 
 FirstGuess guess_motion(const Drive& drive, const Calibration& given, const Calibration& now,
                         const FilterConfig& config, double interval) {
-  FilterConfig settings = config;
-  if (!given.cameras.empty()) settings.odometer.model = OdometerModel::none;
+  const double duration = seconds_between(drive.imu.front().t_ns, drive.imu.back().t_ns);
+  FilterConfig cameras = config;
+  if (!given.cameras.empty()) cameras.odometer.model = OdometerModel::none;
   FirstGuess guess;
-  guess.states = Feed(drive, given, now, settings, interval).run();
-  if (given.cameras.empty()) guess.states = bridge_gaps(guess.states, drive.imu, interval, kLongestGap, kBridged);
-  keep_longest(guess.states);
-  const double length =
-      guess.states.empty() ? 0.0 : seconds_between(guess.states.front().state.t_ns, guess.states.back().state.t_ns);
+  guess.states = longest_piece(drive, given, now, cameras, interval);
+  if (!given.cameras.empty() && given.encoder && length_of(guess.states) < kWhole * duration) {  // the cameras lost it
+    std::vector<GuessedState> with_wheels = longest_piece(drive, given, now, config, interval);
+    if (length_of(with_wheels) > length_of(guess.states)) guess.states = std::move(with_wheels);
+  }
+  const double length = length_of(guess.states);
   if (length < kShortest) {
     throw std::invalid_argument(drive.name + ": only " + std::to_string(length) +
                                 " s in one piece could be estimated; a calibration needs a start at rest, images with "
                                 "texture, and a calibration that is roughly right");
   }
-  guess.left_out = seconds_between(drive.imu.front().t_ns, drive.imu.back().t_ns) - length;
+  guess.left_out = duration - length;
   return guess;
 }
 

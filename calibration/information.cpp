@@ -68,7 +68,7 @@ double rows_over_free(const Batch& batch, double feature_rows) {
 
 std::optional<Information> information_of(Batch& batch, int threads) {
   Eigen::Index n = 0;
-  for (const ParameterBlock& block : batch.parameter_blocks()) n += static_cast<Eigen::Index>(block.entries.size());
+  for (const CalibrationBlock& block : batch.parameter_blocks()) n += static_cast<Eigen::Index>(block.entries.size());
   const Linearized all = linearized(batch, threads);
   const auto columns = last_columns(all.J, n);
   if (!columns) return std::nullopt;

@@ -53,9 +53,9 @@ struct RollModel {
     const Vector3<T> b_g = blocks[2].vector3(smoother::motion_entry::b_g);
     const T& late = blocks[5].v[0];
     const T pitched = axle.y.dot(turned.cast<T>() - b_g * T(duration));
-    const Matrix3<T> R_iW = blocks[0].R().transpose();
-    const Matrix3<T> R_ij = R_iW * blocks[1].R();
-    const Vector3<T> moved = R_iW * (blocks[1].p() - blocks[0].p());
+    const Matrix3<T> R_BiW = blocks[0].R().transpose();
+    const Matrix3<T> R_ij = R_BiW * blocks[1].R();
+    const Vector3<T> moved = R_BiW * (blocks[1].p() - blocks[0].p());
     const Vector3<T> moved_O = moved + R_ij * axle.p - axle.p;
     Vector3<T> r;
     for (int side = 0; side < 2; ++side) {

@@ -50,11 +50,11 @@ class BlockMaker {
     for (const char* axis : {" x", " y", " z"}) add(name + axis, unit, scale, prior);
     return *this;
   }
-  [[nodiscard]] const ParameterBlock& block() const { return block_; }
+  [[nodiscard]] const CalibrationBlock& block() const { return block_; }
 
  private:
   std::string sensor_;
-  ParameterBlock block_;
+  CalibrationBlock block_;
 };
 
 constexpr double kToDegrees = 1.0 / kDegree;
@@ -62,7 +62,7 @@ constexpr double kToMillimetres = 1e3;
 constexpr double kToMilliseconds = 1e3;
 
 void add_cameras(Parameters& parameters, const Calibration& given, const Priors& priors,
-                 std::vector<ParameterBlock>& blocks) {
+                 std::vector<CalibrationBlock>& blocks) {
   if (given.cameras.empty()) return;
   blocks.push_back(BlockMaker(parameters.camera.data(), "cam0")
                        .axes("rotation in the body about", "deg", kToDegrees, priors.camera_rotation)
@@ -90,7 +90,7 @@ void add_cameras(Parameters& parameters, const Calibration& given, const Priors&
 }
 
 void add_wheels(Parameters& parameters, const Calibration& given, const Priors& priors,
-                std::vector<ParameterBlock>& blocks) {
+                std::vector<CalibrationBlock>& blocks) {
   if (!given.encoder) return;
   const EncoderCalibration& encoder = *given.encoder;
   const double radius = 500.0 * (encoder.wheel_radius[0] + encoder.wheel_radius[1]);  // [mm]
@@ -112,7 +112,7 @@ void add_wheels(Parameters& parameters, const Calibration& given, const Priors& 
 }
 
 void add_beams(Parameters& parameters, const Calibration& given, const Priors& priors,
-               std::vector<ParameterBlock>& blocks) {
+               std::vector<CalibrationBlock>& blocks) {
   if (!given.lasers) return;
   for (std::size_t i = 0; i < parameters.beams.size(); ++i) {
     blocks.push_back(BlockMaker(parameters.beams[i].data(), "laser0 " + given.lasers->beams[i].name)
@@ -166,8 +166,8 @@ Priors priors_of(const Calibration& given) {
   return priors;
 }
 
-std::vector<ParameterBlock> blocks_of(Parameters& parameters, const Calibration& given, const Priors& priors) {
-  std::vector<ParameterBlock> blocks;
+std::vector<CalibrationBlock> blocks_of(Parameters& parameters, const Calibration& given, const Priors& priors) {
+  std::vector<CalibrationBlock> blocks;
   add_cameras(parameters, given, priors, blocks);
   add_wheels(parameters, given, priors, blocks);
   add_beams(parameters, given, priors, blocks);

@@ -52,14 +52,14 @@ struct Entry {
 };
 
 /// A block and the numbers that it holds.
-struct ParameterBlock {
+struct CalibrationBlock {
   double* data = nullptr;
   std::vector<Entry> entries;
 };
 
 /// All that the vehicle has, in a fixed order. They point into `parameters`, whose beams must have been sized.
-[[nodiscard]] std::vector<ParameterBlock> blocks_of(Parameters& parameters, const Calibration& given,
-                                                    const Priors& priors);
+[[nodiscard]] std::vector<CalibrationBlock> blocks_of(Parameters& parameters, const Calibration& given,
+                                                      const Priors& priors);
 
 /// Of the size that the calibration asks for.
 [[nodiscard]] Parameters zero_parameters(const Calibration& given);

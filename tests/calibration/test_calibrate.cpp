@@ -64,7 +64,8 @@ struct Poor {
 
 void check_poor(const Poor& poor) {
   double squares = 0.0, count = 0.0;
-  for (unsigned seed = 31; seed <= 33; ++seed) {
+  // With the cameras of 34 alone the estimate is lost; the last image of 78 is later than the last inertial sample.
+  for (const unsigned seed : {31U, 34U, 78U}) {
     CAPTURE(seed);
     const SimulatedCalibration made = calibrated(poor.sequence, seed, 15.0, poor.duration);
     for (std::size_t i = 0; i < made.errors.size(); ++i) {

@@ -31,7 +31,7 @@ std::vector<double> errors_left(const Result& result, const Calibration& given, 
                                 const Priors& priors) {
   std::vector<double> errors;
   Parameters parameters = errors_of(given, truth);
-  for (const ParameterBlock& block : blocks_of(parameters, given, priors)) {
+  for (const CalibrationBlock& block : blocks_of(parameters, given, priors)) {
     for (const Entry& entry : block.entries) {
       errors.push_back(entry.scale * *entry.value - result.findings[errors.size()].change);
     }
