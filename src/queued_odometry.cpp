@@ -38,10 +38,6 @@ const Calibration& checked(const Calibration& calibration, const QueueCapacity& 
           "calibration: at most three laser beams");
   require(std::abs(calibration.camera_time_offset) <= kLargestTimeOffset,
           "calibration: camera_time_offset must be a number of seconds, at most an hour");
-  require(!calibration.encoder || std::abs(calibration.encoder->time_offset) <= kLargestTimeOffset,
-          "calibration: the encoder's time_offset must be a number of seconds, at most an hour");
-  require(!calibration.lasers || std::abs(calibration.lasers->time_offset) <= kLargestTimeOffset,
-          "calibration: the lasers' time_offset must be a number of seconds, at most an hour");
   return calibration;
 }
 
@@ -124,11 +120,12 @@ void QueuedOdometry::hand_over(TimeNs until_ns) {
     const ImuSample* const imu = imu_.queue.front();
     const EncoderSample* const encoder = encoder_.queue.front();
     const Ranges* const laser = laser_.queue.front();
-    const TimeNs earliest = std::min({imu_time(imu_), imu_time(encoder_), imu_time(laser_)});
+    const TimeNs encoder_ns = imu_time(encoder, encoder_.time_offset);
+    const TimeNs earliest = std::min({imu_time(imu), encoder_ns, imu_time(laser, laser_.time_offset)});
     if (imu != nullptr && imu->t_ns == earliest) {
       hand_over(*imu);
       imu_.queue.pop();
-    } else if (encoder != nullptr && imu_time(encoder_) == earliest) {
+    } else if (encoder != nullptr && encoder_ns == earliest) {
       odometry_.add_encoder(*encoder);
       encoder_.queue.pop();
     } else if (laser != nullptr) {
@@ -147,7 +144,7 @@ void QueuedOdometry::drop_old_frames() {
   while (2 * imu_.queue.size() > imu_.queue.capacity() && frames_.queue.size() > 1) {
     frames_.queue.pop();
     frames_.overflows.fetch_add(1, std::memory_order_relaxed);
-    hand_over(imu_time(frames_));
+    hand_over(imu_time(frames_.queue.front(), frames_.time_offset));
   }
 }
 
@@ -175,7 +172,7 @@ Progress QueuedOdometry::process(std::optional<Estimate>& estimate, QueuedFrame*
     hand_over(std::numeric_limits<TimeNs>::max());
     return Progress::no_frame;
   }
-  const TimeNs frame_ns = imu_time(frames_);
+  const TimeNs frame_ns = imu_time(frame, frames_.time_offset);
   hand_over(frame_ns);
   if (newest_imu_ns_ < frame_ns && !frames_.queue.full()) return Progress::no_frame;
   estimate = odometry_.add_stereo(view_of(*frame, cameras_));
@@ -186,7 +183,8 @@ Progress QueuedOdometry::process(std::optional<Estimate>& estimate, QueuedFrame*
 }
 
 std::optional<TimeNs> QueuedOdometry::next_frame_ns() const {
-  return frames_.queue.front() == nullptr ? std::nullopt : std::optional(imu_time(frames_));
+  const QueuedFrame* const frame = frames_.queue.front();
+  return frame == nullptr ? std::nullopt : std::optional(imu_time(frame, frames_.time_offset));
 }
 
 std::optional<Estimate> QueuedOdometry::step(TimeNs t_ns) {

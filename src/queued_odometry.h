@@ -112,11 +112,10 @@ class QueuedOdometry {
     return true;
   }
 
-  /// Of the oldest that waits; the largest number if there is none.
+  /// The largest number for null.
   template <typename T>
-  [[nodiscard]] static TimeNs imu_time(const Inlet<T>& inlet) {
-    const T* const oldest = inlet.queue.front();
-    return oldest == nullptr ? std::numeric_limits<TimeNs>::max() : later_by(inlet.time_offset, oldest->t_ns);
+  [[nodiscard]] static TimeNs imu_time(const T* sample, double time_offset = 0.0) {
+    return sample == nullptr ? std::numeric_limits<TimeNs>::max() : later_by(time_offset, sample->t_ns);
   }
   void drop_old_frames();
   void hand_over(const ImuSample& sample);

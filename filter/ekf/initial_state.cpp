@@ -81,10 +81,6 @@ const Calibration& checked(const Calibration& calibration) {
   }
   require(std::abs(calibration.camera_time_offset) <= kLargestTimeOffset,
           "calibration: camera_time_offset must be a number of seconds, at most an hour");
-  require(!calibration.encoder || std::abs(calibration.encoder->time_offset) <= kLargestTimeOffset,
-          "calibration: the encoder's time_offset must be a number of seconds, at most an hour");
-  require(!calibration.lasers || std::abs(calibration.lasers->time_offset) <= kLargestTimeOffset,
-          "calibration: the lasers' time_offset must be a number of seconds, at most an hour");
   require(calibration.imu.gyro_noise > 0.0 && calibration.imu.accel_noise > 0.0,
           "calibration: imu noise must be positive");
   if (const auto& encoder = calibration.encoder) {
@@ -92,12 +88,16 @@ const Calibration& checked(const Calibration& calibration) {
             "calibration: wheel_radius must be positive");
     require(encoder->track_width > 0.0, "calibration: track_width must be positive");
     require(encoder->resolution > 0, "calibration: encoder resolution must be positive");
+    require(std::abs(encoder->time_offset) <= kLargestTimeOffset,
+            "calibration: the encoder's time_offset must be a number of seconds, at most an hour");
     const Eigen::Matrix3d R = encoder->T_BO.linear();
     require((R * R.transpose() - Eigen::Matrix3d::Identity()).norm() < 1e-3 && R.determinant() > 0.0,
             "calibration: the encoder's T_BS holds no rotation");
   }
   if (const auto& lasers = calibration.lasers) {
     require(lasers->beams.size() <= kMaxBeams, "calibration: at most three laser beams");
+    require(std::abs(lasers->time_offset) <= kLargestTimeOffset,
+            "calibration: the lasers' time_offset must be a number of seconds, at most an hour");
     for (const LaserBeam& beam : lasers->beams) {
       require(std::abs(beam.d_B.norm() - 1.0) < 1e-2, "calibration: a laser's direction must have length one");
     }
