@@ -202,10 +202,11 @@ void Batch::add_beams(std::size_t s, double gate) {
   const LaserCalibration& lasers = *given_.lasers;
   std::size_t i = 0;
   for (const LaserSample& sample : segment.drive->lasers) {
-    while (i + 2 < segment.keyframes.size() && segment.keyframes[i + 1].t_ns <= sample.t_ns) ++i;
+    const TimeNs t_ns = later_by(lasers.time_offset, sample.t_ns);
+    while (i + 2 < segment.keyframes.size() && segment.keyframes[i + 1].t_ns <= t_ns) ++i;
     Keyframe& keyframe = segment.keyframes[i];
-    if (sample.t_ns < keyframe.t_ns || keyframe.path.empty() || sample.t_ns > keyframe.path.back().t_ns) continue;
-    const PathNode node = at(keyframe.path, sample.t_ns);
+    if (t_ns < keyframe.t_ns || keyframe.path.empty() || t_ns > keyframe.path.back().t_ns) continue;
+    const PathNode node = at(keyframe.path, t_ns);
     for (std::size_t k = 0; k < lasers.beams.size() && k < sample.range.size(); ++k) {
       const double range = sample.range[k];
       if (!(range >= lasers.range_min && range <= lasers.range_max)) continue;
@@ -218,8 +219,8 @@ void Batch::add_beams(std::size_t s, double gate) {
       if (!fits(residual_norm(*cost, blocks), gate)) continue;
       const Pose T_Wk = smoother::to_pose(keyframe.pose.data());
       const Eigen::Vector3d hit = T_Wk.p + T_Wk.R * (node.p_kt + node.R_kt * (beam.p_BL + range * beam.d_B));
-      add_term({Term::beam, nullptr, s, i, k, sample.t_ns, hit.head<2>()}, cost.release(),
-               new ceres::HuberLoss(kBeamHuber), blocks);
+      add_term({Term::beam, nullptr, s, i, k, t_ns, hit.head<2>()}, cost.release(), new ceres::HuberLoss(kBeamHuber),
+               blocks);
     }
   }
 }

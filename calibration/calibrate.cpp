@@ -120,8 +120,6 @@ Result calibrate(const Calibration& given, const Priors& priors, const std::vect
   result.after = residuals_of(batch);
   result.parameters = batch.parameters();
   result.noise = batch.noise();
-  result.encoder_time = batch.parameters().encoder_time[0];
-  result.laser_time = batch.parameters().laser_time[0];
   result.left_out = passed.left_out;
   result.calibration = with_sigmas(applied(given, batch.parameters()), result.findings);
   return result;

@@ -18,9 +18,8 @@ struct Result {
   std::vector<Finding> findings;  ///< in the order of blocks_of()
   Eigen::MatrixXd covariance;     ///< in the units of Parameters
   Noise noise;
-  std::vector<Residual> before, after;          ///< by the calibration given, and by that found
-  double encoder_time = 0.0, laser_time = 0.0;  ///< [s] to add to the stamps
-  double left_out = 0.0;                        ///< [s] of the drives, where there was no estimate in one piece
+  std::vector<Residual> before, after;  ///< by the calibration given, and by that found
+  double left_out = 0.0;                ///< [s] of the drives, where there was no estimate in one piece
 };
 
 struct Settings {

@@ -54,14 +54,18 @@ class Feed {
         now_(now),
         filter_(config, now),
         interval_ns_(static_cast<TimeNs>(std::llround(1e9 * interval))),
-        offset_ns_(static_cast<TimeNs>(std::llround(1e9 * now.camera_time_offset))) {}
+        encoder_offset_(now.encoder ? now.encoder->time_offset : 0.0),
+        laser_offset_(now.lasers ? now.lasers->time_offset : 0.0) {}
 
   std::vector<GuessedState> run() {
     for (const ImuSample& sample : drive_.imu) {
       filter_.add_imu(sample);
-      add_until(sample.t_ns, drive_.encoders, encoder_, [&](const EncoderSample& s) { filter_.add_encoder(s); });
-      add_until(sample.t_ns, drive_.lasers, laser_, [&](const LaserSample& s) { filter_.add_laser(s); });
-      add_until(sample.t_ns - offset_ns_, drive_.frames, frame_, [&](const FeatureFrame& f) { take(f); });
+      add_until(later_by(-encoder_offset_, sample.t_ns), drive_.encoders, encoder_,
+                [&](const EncoderSample& s) { filter_.add_encoder(s); });
+      add_until(later_by(-laser_offset_, sample.t_ns), drive_.lasers, laser_,
+                [&](const LaserSample& s) { filter_.add_laser(s); });
+      add_until(later_by(-now_.camera_time_offset, sample.t_ns), drive_.frames, frame_,
+                [&](const FeatureFrame& f) { take(f); });
       if (given_.cameras.empty() && due(sample.t_ns)) {
         if (const auto estimate = filter_.process_without_image(sample.t_ns)) {
           states_.push_back({estimate->state, sample.t_ns, {}});
@@ -90,7 +94,8 @@ class Feed {
   const Calibration& given_;
   const Calibration& now_;
   Filter filter_;
-  TimeNs interval_ns_, offset_ns_;
+  TimeNs interval_ns_;
+  double encoder_offset_, laser_offset_;  ///< [s] of their clocks
   std::size_t encoder_ = 0, laser_ = 0, frame_ = 0;
   std::vector<GuessedState> states_;
 };

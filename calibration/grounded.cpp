@@ -47,13 +47,14 @@ void mark_ground(Segment& segment, const LaserCalibration& lasers) {
   TimeNs last_ns = 0;
   int odd = 0;  // readings in a row: a single one meets a passer-by
   for (const LaserSample& sample : segment.drive->lasers) {
+    const TimeNs t_ns = later_by(lasers.time_offset, sample.t_ns);
     const auto range = mean_range(sample, lasers);
     odd = !range || *range > *level + kLonger ? odd + 1 : 0;
     if (odd > 2) {
-      if (!off) since_ns = sample.t_ns;
+      if (!off) since_ns = t_ns;
       off = true;
-      last_ns = sample.t_ns;
-    } else if (off && sample.t_ns > last_ns + kMargin) {
+      last_ns = t_ns;
+    } else if (off && t_ns > last_ns + kMargin) {
       mark_off(segment, since_ns - kMargin, last_ns + kMargin);
       off = false;
     }

@@ -107,7 +107,7 @@ void add_wheels(Parameters& parameters, const Calibration& given, const Priors& 
                        .add("axle turned about z", "deg", kToDegrees, priors.axle_rotation)
                        .block());
   blocks.push_back(BlockMaker(parameters.encoder_time.data(), "encoder0")
-                       .add("time offset", "ms", kToMilliseconds, priors.encoder_time)
+                       .add("time offset", "ms", kToMilliseconds, priors.encoder_time, 1e3 * encoder.time_offset)
                        .block());
 }
 
@@ -122,7 +122,7 @@ void add_beams(Parameters& parameters, const Calibration& given, const Priors& p
                          .block());
   }
   blocks.push_back(BlockMaker(parameters.laser_time.data(), "laser0")
-                       .add("time offset", "ms", kToMilliseconds, priors.laser_time)
+                       .add("time offset", "ms", kToMilliseconds, priors.laser_time, 1e3 * given.lasers->time_offset)
                        .block());
 }
 
@@ -151,8 +151,7 @@ Priors priors_of(const Calibration& given) {
   }
   priors.distortion = 2e-3;
   priors.camera_time = given.camera_time_offset_sigma.value_or(0.01);
-  priors.encoder_time = 2e-3;
-  priors.laser_time = 2e-3;
+  priors.laser_time = given.lasers.value_or(LaserCalibration{}).time_offset_sigma.value_or(2e-3);
   priors.beam_origin = 0.02;
   priors.beam_direction = 10.0 * kDegree;
   const EncoderCalibration encoder = given.encoder.value_or(EncoderCalibration{});
@@ -163,6 +162,7 @@ Priors priors_of(const Calibration& given) {
   priors.wheel_radius = encoder.wheel_radius_sigma.value_or(0.05 * radius) / radius;
   priors.radius_difference = encoder.wheel_radius_difference_sigma.value_or(0.02 * radius) / radius;
   priors.track_width = encoder.track_width_sigma.value_or(0.05 * encoder.track_width) / encoder.track_width;
+  priors.encoder_time = encoder.time_offset_sigma.value_or(2e-3);
   return priors;
 }
 
@@ -196,11 +196,13 @@ Calibration applied(const Calibration& given, const Parameters& parameters) {
     encoder.wheel_radius[0] *= 1.0 + wheels[0] + 0.5 * wheels[1];
     encoder.wheel_radius[1] *= 1.0 + wheels[0] - 0.5 * wheels[1];
     encoder.track_width *= 1.0 + wheels[2];
+    encoder.time_offset += parameters.encoder_time[0];
     encoder.T_BO.translation() += vector(parameters.axle.data());
     const Eigen::Vector3d y_O(-parameters.axle[4], 1.0, parameters.axle[3]);
     encoder.T_BO.linear() *= Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitY(), y_O).toRotationMatrix();
   }
   if (result.lasers) {
+    result.lasers->time_offset += parameters.laser_time[0];
     for (std::size_t i = 0; i < parameters.beams.size(); ++i) {
       LaserBeam& beam = result.lasers->beams[i];
       const std::array<double, 5>& error = parameters.beams[i];
@@ -229,10 +231,12 @@ Parameters errors_of(const Calibration& given, const Calibration& truth) {
     const double left = to.wheel_radius[0] / from.wheel_radius[0] - 1.0;
     const double right = to.wheel_radius[1] / from.wheel_radius[1] - 1.0;
     errors.wheels = {0.5 * (left + right), left - right, to.track_width / from.track_width - 1.0};
+    errors.encoder_time[0] = to.time_offset - from.time_offset;
     const Eigen::Vector3d p = to.T_BO.translation() - from.T_BO.translation();
     const Eigen::Vector3d y_O = from.T_BO.linear().transpose() * to.T_BO.linear().col(1);
     errors.axle = {p.x(), p.y(), p.z(), y_O.z() / y_O.y(), -y_O.x() / y_O.y()};
   }
+  if (given.lasers) errors.laser_time[0] = truth.lasers->time_offset - given.lasers->time_offset;
   for (std::size_t i = 0; i < errors.beams.size(); ++i) {
     const LaserBeam& from = given.lasers->beams[i];
     const LaserBeam& to = truth.lasers->beams[i];
@@ -264,8 +268,12 @@ Calibration with_priors(const Calibration& given, const Priors& priors) {
     encoder.wheel_radius_sigma = priors.wheel_radius * radius;
     encoder.wheel_radius_difference_sigma = std::min(priors.radius_difference, 1.9 * priors.wheel_radius) * radius;
     encoder.track_width_sigma = priors.track_width * encoder.track_width;
+    encoder.time_offset_sigma = priors.encoder_time;
   }
-  if (result.lasers) result.lasers->offset_sigma = priors.beam_origin;
+  if (result.lasers) {
+    result.lasers->time_offset_sigma = priors.laser_time;
+    result.lasers->offset_sigma = priors.beam_origin;
+  }
   return result;
 }
 

@@ -64,10 +64,10 @@ struct CalibrationBlock {
 /// Of the size that the calibration asks for.
 [[nodiscard]] Parameters zero_parameters(const Calibration& given);
 
-/// The calibration that the parameters say. Offsets of the encoders' and lasers' clocks have no place in it.
+/// The calibration that the parameters say.
 [[nodiscard]] Calibration applied(const Calibration& given, const Parameters& parameters);
 
-/// The parameters for which applied(given, ...) is `truth`, in what the models depend on. The clocks' are zero.
+/// The parameters for which applied(given, ...) is `truth`, in what the models depend on.
 [[nodiscard]] Parameters errors_of(const Calibration& given, const Calibration& truth);
 
 /// `given` with the standard deviations stated that `priors` are: what the filter starts with.

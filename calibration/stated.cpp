@@ -62,8 +62,12 @@ Calibration with_sigmas(Calibration calibration, const std::vector<Finding>& fin
     encoder.wheel_radius_difference_sigma =
         std::min(thousandth(findings, "encoder0: wheel radius, left"), 1.9 * *encoder.wheel_radius_sigma);
     encoder.track_width_sigma = thousandth(findings, "encoder0: wheel separation");
+    encoder.time_offset_sigma = thousandth(findings, "encoder0: time");
   }
-  if (calibration.lasers) calibration.lasers->offset_sigma = range_sigma(findings, *calibration.lasers);
+  if (calibration.lasers) {
+    calibration.lasers->time_offset_sigma = thousandth(findings, "laser0: time");
+    calibration.lasers->offset_sigma = range_sigma(findings, *calibration.lasers);
+  }
   return calibration;
 }
 

@@ -14,7 +14,7 @@ WheelAngles::WheelAngles(const EncoderCalibration& encoder, const std::vector<En
   Eigen::Vector2d angle = Eigen::Vector2d::Zero();
   for (const EncoderSample& sample : samples) {
     if (const auto turn = reader.add(sample)) angle += turn->angle;
-    readings_.push_back({sample.t_ns, angle});
+    readings_.push_back({later_by(encoder.time_offset, sample.t_ns), angle});
   }
 }
 

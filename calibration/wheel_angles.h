@@ -14,7 +14,8 @@ class WheelAngles {
  public:
   WheelAngles(const EncoderCalibration& encoder, const std::vector<EncoderSample>& samples);
 
-  /// Left and right, since the first reading [rad]. Nothing where there is no reading within 0.1 s on either side.
+  /// Left and right, since the first reading [rad], by IMU time and the encoder's `time_offset`. Nothing where there is
+  /// no reading within 0.1 s on either side.
   [[nodiscard]] std::optional<Eigen::Vector2d> angle(TimeNs t_ns) const;
   /// How fast they turn [rad/s], over 40 ms.
   [[nodiscard]] std::optional<Eigen::Vector2d> speed(TimeNs t_ns) const;

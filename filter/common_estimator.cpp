@@ -32,7 +32,9 @@ CommonEstimator::CommonEstimator(const FilterConfig& config, const Calibration& 
       sources_(config, calibration),
       start_(config, calibration),
       consistency_check_(config.anomaly),
-      health_(config.odometer, calibration, sources_.uses_wheels(), uses_beams) {}
+      health_(calibration, sources_.uses_wheels(), uses_beams) {
+  if (calibration.lasers) laser_.range.reserve(calibration.lasers->beams.size());
+}
 
 void CommonEstimator::succeed(CommonEstimator& before, TimeNs t_ns, TimeNs clock_shift) {
   before.ingest_.restart();
@@ -82,8 +84,10 @@ void CommonEstimator::take_imu() {
   if (ingest_.imu_clock().take_correction()) health_.report_imu_fault({true, true}, ingest_.imu().newest().t_ns);
 }
 
-void CommonEstimator::add_encoder(const EncoderSample& sample) {
+void CommonEstimator::add_encoder(const EncoderSample& given) {
   if (!sources_.uses_wheels()) return;
+  EncoderSample sample = given;
+  sample.t_ns = later_by(calibration_.encoder->time_offset, given.t_ns);
   ingest_.imu_clock().observe(ImuClock::Stream::encoder, sample.t_ns);
   take_imu();
   const Ingest::Encoders taken = ingest_.take(sample, ekf_.time());
@@ -91,15 +95,15 @@ void CommonEstimator::add_encoder(const EncoderSample& sample) {
   if (taken.verdict != Verdict::accepted || !taken.increment) return;
   note(sources_.watch_contact(*taken.increment, ekf_));
   sources_.standstill().add(*taken.increment);
-  if (ekf_.running() && sources_.on_ground()) {
-    health_.add_increment(*taken.increment, ingest_.imu(), ekf_.state().imu.b_g);
-  }
   if (const auto due_ns = ingest_.due_before(*taken.increment, ekf_.running())) make_room(*due_ns);
   ingest_.push(*taken.increment);
 }
 
-void CommonEstimator::add_laser(const LaserSample& sample) {
+void CommonEstimator::add_laser(const LaserSample& given) {
   if (!sources_.uses_wheels() || !calibration_.lasers || calibration_.lasers->beams.empty()) return;
+  LaserSample& sample = laser_;
+  sample.t_ns = later_by(calibration_.lasers->time_offset, given.t_ns);
+  sample.range.assign(given.range.begin(), given.range.end());
   ingest_.imu_clock().observe(ImuClock::Stream::laser, sample.t_ns);
   take_imu();
   const Verdict verdict = ingest_.judge(sample, ekf_.time());
@@ -177,6 +181,7 @@ HealthMonitor::Frame CommonEstimator::health_frame(bool image, const FrameAgreem
   frame.waits_for = start_.waits_for();
   frame.agreement = seen;
   frame.statistics = records_.statistics;
+  frame.misaligned = sources_.wheels() && sources_.wheels()->misaligned();
   frame.lifted = sources_.wheels() && sources_.wheels()->lifting(frame.t_ns);
   if (!estimate) return frame;
   frame.possible = ekf_.possible();

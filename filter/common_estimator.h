@@ -25,8 +25,8 @@ class CommonEstimator : public Estimator {
  public:
   void start_at(const GivenStart& start) final;
   void add_imu(const ImuSample& sample) final;
-  void add_encoder(const EncoderSample& sample) final;
-  void add_laser(const LaserSample& sample) final;
+  void add_encoder(const EncoderSample& given) final;
+  void add_laser(const LaserSample& given) final;
   [[nodiscard]] std::optional<RelativeMotion> motion_to(TimeNs t_ns) const final;
   [[nodiscard]] std::optional<TimeNs> common_stamp(TimeNs camera_stamp_ns) final;
   [[nodiscard]] std::optional<NavState> predict(TimeNs t_ns) const final;
@@ -85,6 +85,8 @@ class CommonEstimator : public Estimator {
   virtual void note(ContactEvent /*event*/) {}
 
   void take_imu();
+
+  LaserSample laser_;  ///< the one that comes in, by the clock of the IMU; its memory is used again
 };
 
 }  // namespace ear

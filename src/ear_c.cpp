@@ -114,6 +114,7 @@ ear::EncoderCalibration encoder_of(const ear_calibration& from) {
   encoder.track_width = from.track_width;
   encoder.noise_counts = from.encoder_noise_counts;
   encoder.stamp_sigma = from.encoder_stamp_sigma;
+  encoder.time_offset = from.encoder_time_offset;
   encoder.T_BO_sigma = pose_sigma_of(from.odometer_rotation_sigma, from.odometer_position_sigma);
   encoder.wheel_radius_sigma = sigma_of(from.wheel_radius_sigma);
   encoder.wheel_radius_difference_sigma = sigma_of(from.wheel_radius_difference_sigma);
@@ -130,6 +131,7 @@ ear::LaserCalibration lasers_of(const ear_calibration& from) {
   lasers.range_min = from.range_min;
   lasers.range_max = from.range_max;
   lasers.noise = from.laser_noise;
+  lasers.time_offset = from.laser_time_offset;
   lasers.offset_sigma = sigma_of(from.beam_offset_sigma);
   return lasers;
 }

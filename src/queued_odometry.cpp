@@ -81,11 +81,13 @@ QueuedOdometry::QueuedOdometry(const Config& config, const Calibration& calibrat
                      : Odometry(config, checked(calibration, capacity), std::move(clock))),
       drops_frames_(config.performance.budget_ms > 0.0),
       cameras_(calibration.cameras),
-      camera_offset_ns_(std::llround(1e9 * calibration.camera_time_offset)),
       imu_(elements(capacity.seconds, calibration.imu.rate_hz), {}),
-      encoder_(calibration.encoder ? elements(capacity.seconds, calibration.encoder->rate_hz) : 0, {}),
-      laser_(calibration.lasers ? elements(capacity.seconds, calibration.lasers->rate_hz) : 0, {}),
-      frames_(calibration.cameras.empty() ? 0 : capacity.frame_slots, empty_frame(calibration.cameras)),
+      encoder_(calibration.encoder ? elements(capacity.seconds, calibration.encoder->rate_hz) : 0, {},
+               calibration.encoder ? calibration.encoder->time_offset : 0.0),
+      laser_(calibration.lasers ? elements(capacity.seconds, calibration.lasers->rate_hz) : 0, {},
+             calibration.lasers ? calibration.lasers->time_offset : 0.0),
+      frames_(calibration.cameras.empty() ? 0 : capacity.frame_slots, empty_frame(calibration.cameras),
+              calibration.camera_time_offset),
       live_(imu_.queue.capacity()) {
   if (calibration.lasers) laser_sample_.range.resize(calibration.lasers->beams.size());
 }
@@ -104,9 +106,6 @@ bool QueuedOdometry::add_stereo(const StereoFrame& frame) {
   return true;
 }
 
-/// The sum as a difference, which stays in range whatever the camera's stamp is.
-TimeNs QueuedOdometry::imu_time(TimeNs camera_ns) const { return duration_ns(-camera_offset_ns_, camera_ns); }
-
 void QueuedOdometry::hand_over(const ImuSample& sample) {
   odometry_.add_imu(sample);
   if (!is_time(sample.t_ns)) return;
@@ -117,17 +116,16 @@ void QueuedOdometry::hand_over(const ImuSample& sample) {
 /// Up to and with the first inertial sample that is not earlier than `until_ns`: an interval ends between two samples.
 /// All that waits where the inertial clock is far ahead: it has jumped, or the others were set back.
 void QueuedOdometry::hand_over(TimeNs until_ns) {
-  constexpr TimeNs kNever = std::numeric_limits<TimeNs>::max();
-  const auto time_of = [](const auto* sample) { return sample == nullptr ? kNever : sample->t_ns; };
   while (newest_imu_ns_ < until_ns || seconds_between(until_ns, newest_imu_ns_) > kFarAhead) {
     const ImuSample* const imu = imu_.queue.front();
     const EncoderSample* const encoder = encoder_.queue.front();
     const Ranges* const laser = laser_.queue.front();
-    const TimeNs earliest = std::min({time_of(imu), time_of(encoder), time_of(laser)});
+    const TimeNs encoder_ns = imu_time(encoder, encoder_.time_offset);
+    const TimeNs earliest = std::min({imu_time(imu), encoder_ns, imu_time(laser, laser_.time_offset)});
     if (imu != nullptr && imu->t_ns == earliest) {
       hand_over(*imu);
       imu_.queue.pop();
-    } else if (encoder != nullptr && encoder->t_ns == earliest) {
+    } else if (encoder != nullptr && encoder_ns == earliest) {
       odometry_.add_encoder(*encoder);
       encoder_.queue.pop();
     } else if (laser != nullptr) {
@@ -146,7 +144,7 @@ void QueuedOdometry::drop_old_frames() {
   while (2 * imu_.queue.size() > imu_.queue.capacity() && frames_.queue.size() > 1) {
     frames_.queue.pop();
     frames_.overflows.fetch_add(1, std::memory_order_relaxed);
-    hand_over(imu_time(frames_.queue.front()->t_ns));
+    hand_over(imu_time(frames_.queue.front(), frames_.time_offset));
   }
 }
 
@@ -174,7 +172,7 @@ Progress QueuedOdometry::process(std::optional<Estimate>& estimate, QueuedFrame*
     hand_over(std::numeric_limits<TimeNs>::max());
     return Progress::no_frame;
   }
-  const TimeNs frame_ns = imu_time(frame->t_ns);
+  const TimeNs frame_ns = imu_time(frame, frames_.time_offset);
   hand_over(frame_ns);
   if (newest_imu_ns_ < frame_ns && !frames_.queue.full()) return Progress::no_frame;
   estimate = odometry_.add_stereo(view_of(*frame, cameras_));
@@ -186,7 +184,7 @@ Progress QueuedOdometry::process(std::optional<Estimate>& estimate, QueuedFrame*
 
 std::optional<TimeNs> QueuedOdometry::next_frame_ns() const {
   const QueuedFrame* const frame = frames_.queue.front();
-  return frame == nullptr ? std::nullopt : std::optional(imu_time(frame->t_ns));
+  return frame == nullptr ? std::nullopt : std::optional(imu_time(frame, frames_.time_offset));
 }
 
 std::optional<Estimate> QueuedOdometry::step(TimeNs t_ns) {

@@ -95,8 +95,10 @@ class QueuedOdometry {
   struct Inlet {
     SampleQueue<T> queue;
     std::atomic<std::uint64_t> overflows{0};
+    double time_offset;  ///< [s] added to a stamp gives IMU time
 
-    Inlet(std::size_t capacity, const T& element) : queue(capacity, element) {}
+    Inlet(std::size_t capacity, const T& element, double offset = 0.0)
+        : queue(capacity, element), time_offset(offset) {}
   };
   template <typename T>
   static bool add(Inlet<T>& inlet, const T& sample) {
@@ -110,7 +112,11 @@ class QueuedOdometry {
     return true;
   }
 
-  [[nodiscard]] TimeNs imu_time(TimeNs camera_ns) const;
+  /// The largest number for null.
+  template <typename T>
+  [[nodiscard]] static TimeNs imu_time(const T* sample, double time_offset = 0.0) {
+    return sample == nullptr ? std::numeric_limits<TimeNs>::max() : later_by(time_offset, sample->t_ns);
+  }
   void drop_old_frames();
   void hand_over(const ImuSample& sample);
   void hand_over(TimeNs until_ns);
@@ -120,7 +126,6 @@ class QueuedOdometry {
   Odometry odometry_;
   bool drops_frames_;
   std::vector<CameraCalibration> cameras_;
-  TimeNs camera_offset_ns_;  ///< added to a camera's stamp gives IMU time
   Inlet<ImuSample> imu_;
   Inlet<EncoderSample> encoder_;
   Inlet<Ranges> laser_;

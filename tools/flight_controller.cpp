@@ -50,9 +50,9 @@ FlightController::FlightController(const FlightControllerArguments& args, const 
       output_(link_, R_BV_, calibration.imu) {}
 
 void FlightController::before_sample(const Sample& sample, const Odometry& odometry) {
-  clock_.wait_until(time_of(sample));
   const auto* const imu = std::get_if<ImuSample>(&sample);
-  if (imu == nullptr) return;
+  if (imu == nullptr) return;  // the others come between these, whatever their clocks
+  clock_.wait_until(imu->t_ns);
   if (last_imu_ns_ && output_.wants_prediction(*last_imu_ns_)) {
     if (const auto state = odometry.predict(*last_imu_ns_)) output_.send_prediction(*state);
   }

@@ -36,7 +36,8 @@ class RunView::Impl {
   [[nodiscard]] MakeEstimator tapped(MakeEstimator make) const { return view_.tapped(std::move(make)); }
 
   void before_sample(const Sample& sample) {
-    if (clock_) clock_->wait_until(time_of(sample));
+    const auto* const imu = std::get_if<ImuSample>(&sample);
+    if (clock_ && imu != nullptr) clock_->wait_until(imu->t_ns);  // the others come between these
     if (const auto* frame = std::get_if<RecordedFrame>(&sample)) frames_ = {frames_[1], *frame};
   }
 

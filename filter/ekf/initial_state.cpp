@@ -40,6 +40,7 @@ void require_sigmas(const Calibration& calibration) {
   if (const auto& encoder = calibration.encoder) {
     require(encoder->stamp_sigma >= 0.0 && std::isfinite(encoder->stamp_sigma),
             "calibration: the encoder's stamp_sigma must not be negative");
+    require_sigma(encoder->time_offset_sigma, "calibration: the encoder's time_offset_sigma must be positive");
     require_sigma(encoder->T_BO_sigma, "calibration: T_BO_sigma must be positive");
     require_sigma(encoder->wheel_radius_sigma, "calibration: wheel_radius_sigma must be positive");
     require_sigma(encoder->wheel_radius_difference_sigma,
@@ -47,6 +48,7 @@ void require_sigmas(const Calibration& calibration) {
     require_sigma(encoder->track_width_sigma, "calibration: track_width_sigma must be positive");
   }
   if (calibration.lasers) {
+    require_sigma(calibration.lasers->time_offset_sigma, "calibration: the lasers' time_offset_sigma must be positive");
     require_sigma(calibration.lasers->offset_sigma, "calibration: a laser's offset_sigma must be positive");
   }
 }
@@ -86,12 +88,16 @@ const Calibration& checked(const Calibration& calibration) {
             "calibration: wheel_radius must be positive");
     require(encoder->track_width > 0.0, "calibration: track_width must be positive");
     require(encoder->resolution > 0, "calibration: encoder resolution must be positive");
+    require(std::abs(encoder->time_offset) <= kLargestTimeOffset,
+            "calibration: the encoder's time_offset must be a number of seconds, at most an hour");
     const Eigen::Matrix3d R = encoder->T_BO.linear();
     require((R * R.transpose() - Eigen::Matrix3d::Identity()).norm() < 1e-3 && R.determinant() > 0.0,
             "calibration: the encoder's T_BS holds no rotation");
   }
   if (const auto& lasers = calibration.lasers) {
     require(lasers->beams.size() <= kMaxBeams, "calibration: at most three laser beams");
+    require(std::abs(lasers->time_offset) <= kLargestTimeOffset,
+            "calibration: the lasers' time_offset must be a number of seconds, at most an hour");
     for (const LaserBeam& beam : lasers->beams) {
       require(std::abs(beam.d_B.norm() - 1.0) < 1e-2, "calibration: a laser's direction must have length one");
     }

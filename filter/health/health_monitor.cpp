@@ -20,13 +20,10 @@ constexpr int kDegradedQuality = 60;  // chosen: at most, where a sensor is miss
 
 }  // namespace
 
-HealthMonitor::HealthMonitor(const OdometerConfig& config, const Calibration& calibration, bool uses_wheels,
-                             bool uses_beams)
+HealthMonitor::HealthMonitor(const Calibration& calibration, bool uses_wheels, bool uses_beams)
     : beams_(uses_beams && calibration.lasers ? calibration.lasers->beams.size() : 0),
       wheels_(uses_wheels),
-      images_(calibration.cameras.size()) {
-  if (uses_wheels && calibration.encoder) mounting_.emplace(config, *calibration.encoder);
-}
+      images_(calibration.cameras.size()) {}
 
 const FaultState& HealthMonitor::fault_of(Source source) const {
   if (source == Source::camera_left) return images_.left();
@@ -40,7 +37,6 @@ void HealthMonitor::report(std::initializer_list<Source> sources, TimeNs t_ns) {
 
 void HealthMonitor::succeed(const HealthMonitor& before, TimeNs t_ns) {
   life_.started = before.life_.started;
-  mounting_ = before.mounting_;
   health_.reset_counter = before.health_.reset_counter;
   report({Source::gyroscope, Source::accelerometer}, t_ns);
   decide(t_ns);
@@ -76,10 +72,6 @@ void HealthMonitor::add_encoder(Verdict verdict, TimeNs imu_ns) {
   arrivals_.encoder_interval = std::min(seconds_between(arrivals_.encoder_ns, imu_ns), kStale);
   arrivals_.encoder_ns = imu_ns;
   if (verdict == Verdict::impossible) report({Source::wheel_left, Source::wheel_right}, imu_ns);
-}
-
-void HealthMonitor::add_increment(const WheelIncrement& increment, const ImuBuffer& imu, const Eigen::Vector3d& b_g) {
-  if (mounting_) mounting_->add(increment, imu, b_g);
 }
 
 void HealthMonitor::add_laser(const LaserSample& sample, Verdict verdict, const LaserCalibration& lasers,
@@ -214,7 +206,7 @@ void HealthMonitor::decide(TimeNs t_ns) {
   const bool proven = !lost() || seconds_between(life_.unproven_ns, t_ns) >= FaultState::kSoundAfter;
   const double sigma = std::max(health_.horizontal_sigma, health_.vertical_sigma);
   health_.imprecise = 2.0 * sigma > std::max(kPreciseEnough, kPrecise * life_.travelled);
-  health_.misaligned = mounting_ && mounting_->contradicts();
+  health_.misaligned = last_.misaligned;
   const bool sound = !health_.faulty.any() && !health_.imprecise && !health_.misaligned;
   const HealthStatus status = !life_.started       ? HealthStatus::initialising
                               : !usable || !proven ? HealthStatus::lost

@@ -12,7 +12,6 @@
 #include "ear/health.h"
 #include "filter/health/fault_state.h"
 #include "filter/health/image_health.h"
-#include "filter/health/mounting_watch.h"
 #include "filter/health/rotation_check.h"
 #include "filter/ingest/beam_ranges.h"
 #include "filter/ingest/imu_spike.h"
@@ -22,7 +21,7 @@ namespace ear {
 
 class HealthMonitor {
  public:
-  HealthMonitor(const OdometerConfig& config, const Calibration& calibration, bool uses_wheels, bool uses_beams);
+  HealthMonitor(const Calibration& calibration, bool uses_wheels, bool uses_beams);
 
   /// For an estimator that begins anew: lost from `t_ns` on, if the one before had an estimate.
   void succeed(const HealthMonitor& before, TimeNs t_ns);
@@ -37,8 +36,6 @@ class HealthMonitor {
   /// A reading, used or refused, and the stamp of the newest inertial sample. `stuck`: beams that give the same range
   /// again and again.
   void add_encoder(Verdict verdict, TimeNs imu_ns);
-  /// What wheels on the ground turned, the samples of that time, and the gyroscope's bias [rad/s].
-  void add_increment(const WheelIncrement& increment, const ImuBuffer& imu, const Eigen::Vector3d& b_g);
   void add_laser(const LaserSample& sample, Verdict verdict, const LaserCalibration& lasers,
                  const std::bitset<kMaxBeams>& stuck, TimeNs imu_ns);
 
@@ -57,6 +54,7 @@ class HealthMonitor {
     bool running = false;                 ///< there is a state
     bool possible = true;                 ///< and it and its covariance are numbers, variances not negative
     Reason waits_for = Reason::no_frame;  ///< what the start waits for
+    bool misaligned = false;              ///< Wheels::misaligned
     bool lifted = false;  ///< the vehicle just left the ground or met it, whatever is known of its contact
     FrameAgreement agreement;
     FrameStatistics statistics;
@@ -111,7 +109,6 @@ class HealthMonitor {
   std::array<FaultState, kSourceCount> faults_;  ///< of all but the cameras
   ImageHealth images_;
   RotationCheck rotation_;
-  std::optional<MountingWatch> mounting_;  ///< none without wheels
   std::array<bool, kMaxBeams> no_return_{};
   Arrivals arrivals_;
   Life life_;

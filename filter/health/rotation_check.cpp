@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "filter/health/image_health.h"
+#include "filter/ingest/evidence.h"
 
 namespace ear {
 namespace {

@@ -9,8 +9,6 @@
 
 namespace ear {
 
-inline constexpr double kClear = 4.0;  ///< chosen: so many standard deviations are not chance
-
 class RotationCheck {
  public:
   /// A frame at `t_ns`, `interval` [s] after the one before. `wheels_rejected`: the wheels did not fit, and a velocity

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "filter/ingest/evidence.h"
 #include "filter/ingest/silence.h"
 #include "filter/ingest/stream_clock.h"
 

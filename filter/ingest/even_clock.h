@@ -8,9 +8,6 @@
 
 namespace ear {
 
-/// [s] chosen: of what a regression is made of, and of an interval, which a crystal keeps.
-inline constexpr double kSlopeMemory = 100.0;
-
 class EvenClock {
  public:
   /// Moves both ends of an increment to when its readings were taken, where the counts show even intervals; never later

@@ -66,6 +66,9 @@ struct EncoderCalibration {
   double track_width = 0.40;                         ///< [m]
   double noise_counts = 2.0;                         ///< one reading, 1-sigma [count]
   double stamp_sigma = 0.0;  ///< one reading's stamp [s]: how far its counts may be of another time
+  double time_offset = 0.0;  ///< [s] add it to a stamp to get IMU time
+  /// [s] what a calibration knows it to; the filters take the offset as it is.
+  std::optional<double> time_offset_sigma;
   std::optional<PoseSigma> T_BO_sigma;
   std::optional<double> wheel_radius_sigma;             ///< of the mean of both radii [m]
   std::optional<double> wheel_radius_difference_sigma;  ///< of the left radius less the right one [m]
@@ -81,13 +84,16 @@ struct LaserBeam {
 struct LaserCalibration {
   std::vector<LaserBeam> beams;
   double rate_hz = 50.0;
-  double range_min = 0.02;             ///< [m]
-  double range_max = 4.0;              ///< [m]
-  double noise = 0.004;                ///< 1-sigma [m]
+  double range_min = 0.02;   ///< [m]
+  double range_max = 4.0;    ///< [m]
+  double noise = 0.004;      ///< 1-sigma [m]
+  double time_offset = 0.0;  ///< [s] add it to a stamp to get IMU time
+  /// [s] what a calibration knows it to; the filters take the offset as it is.
+  std::optional<double> time_offset_sigma;
   std::optional<double> offset_sigma;  ///< of what each beam reads too much [m]
 };
 
-/// The largest camera_time_offset [s] that an estimator takes.
+/// The largest offset [s] of a sensor's clock that an estimator takes.
 inline constexpr double kLargestTimeOffset = 3600.0;
 
 struct Calibration {

@@ -79,12 +79,14 @@ typedef struct {
   double track_width;          /* [m] */
   double encoder_noise_counts; /* of one reading, 1-sigma [count] */
   double encoder_stamp_sigma;  /* of the stamp of one reading [s]; 0: exact */
+  double encoder_time_offset;  /* [s] add it to a stamp of the encoders to get IMU time */
 
   int32_t beam_count; /* 0: no lasers */
   ear_beam beams[EAR_MAX_BEAMS];
   double laser_rate_hz;
   double range_min, range_max; /* [m] */
   double laser_noise;          /* 1-sigma [m] */
+  double laser_time_offset;    /* [s] add it to a stamp of the lasers to get IMU time */
 
   double camera_time_offset_sigma;                         /* [s] */
   double gyro_bias_sigma, accel_bias_sigma;                /* [rad/s, m/s^2] */

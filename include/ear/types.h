@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -27,6 +28,13 @@ inline constexpr TimeNs kLargestStamp = 4'500'000'000'000'000'000;
 /// Seconds from `from` to `to`, of any two stamps. The only place where a time becomes floating point: as a difference.
 [[nodiscard]] inline double seconds_between(TimeNs from, TimeNs to) {
   return 1e-9 * static_cast<double>(duration_ns(from, to));
+}
+
+/// The stamp plus `offset` [s], to the nanosecond; the largest or smallest number where the sum is none. An offset that
+/// is no number, or of centuries, changes nothing.
+[[nodiscard]] inline TimeNs later_by(double offset, TimeNs stamp_ns) {
+  constexpr double kMost = 9e9;  // [s] that 64 bits of nanoseconds hold
+  return std::abs(offset) < kMost ? duration_ns(-static_cast<TimeNs>(std::llround(1e9 * offset)), stamp_ns) : stamp_ns;
 }
 
 /// One inertial sample, in the body frame B (which is the IMU's frame).

@@ -43,6 +43,7 @@ void bind_wheels_and_lasers(py::module_& module) {
              Field{"rate_hz", &E::rate_hz}, Field{"resolution", &E::resolution}, Field{"wraps", &E::wraps},
              Field{"wheel_radius", &E::wheel_radius}, Field{"track_width", &E::track_width},
              Field{"noise_counts", &E::noise_counts}, Field{"stamp_sigma", &E::stamp_sigma},
+             Field{"time_offset", &E::time_offset}, Field{"time_offset_sigma", &E::time_offset_sigma},
              Field{"T_BO_sigma", &E::T_BO_sigma}, Field{"wheel_radius_sigma", &E::wheel_radius_sigma},
              Field{"wheel_radius_difference_sigma", &E::wheel_radius_difference_sigma},
              Field{"track_width_sigma", &E::track_width_sigma});
@@ -51,7 +52,8 @@ void bind_wheels_and_lasers(py::module_& module) {
   using L = LaserCalibration;
   bind_value(module, "LaserCalibration", "Laser beams that point at the ground.", Field{"beams", &L::beams},
              Field{"rate_hz", &L::rate_hz}, Field{"range_min", &L::range_min}, Field{"range_max", &L::range_max},
-             Field{"noise", &L::noise}, Field{"offset_sigma", &L::offset_sigma});
+             Field{"noise", &L::noise}, Field{"time_offset", &L::time_offset},
+             Field{"time_offset_sigma", &L::time_offset_sigma}, Field{"offset_sigma", &L::offset_sigma});
 }
 
 }  // namespace

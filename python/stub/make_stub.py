@@ -46,6 +46,7 @@ FIELDS = {
     "gyro_bias_sigma": "float | None", "accel_bias_sigma": "float | None",
     "T_BO_sigma": "PoseSigma | None", "wheel_radius_sigma": "float | None", "wheel_radius_difference_sigma": "float | None",
     "track_width_sigma": "float | None", "offset_sigma": "float | None", "camera_time_offset_sigma": "float | None",
+    "time_offset_sigma": "float | None",
     "encoder": "EncoderCalibration | None", "InputCounts.encoder": "StreamCounts", "lasers": "LaserCalibration | None",
     "cameras": "tuple[CameraCalibration, ...]", "beams": "tuple[LaserBeam, ...]", "T_BC": ARRAY, "T_BO": ARRAY,
     "p_BL": ARRAY, "d_B": ARRAY, "q_WB": ARRAY, "p_WB": ARRAY, "v_W": ARRAY, "b_g": ARRAY, "b_a": ARRAY, "covariance": ARRAY,

@@ -37,8 +37,14 @@ LiveEstimator::LiveEstimator(const Config& config, const Calibration& calibratio
       listeners_(std::move(listeners)),
       steps_(!calibration.cameras.empty(), calibration.encoder.has_value()),
       reached_ns_(kNever) {
-  if (calibration.encoder) encoder_.period_ns = period(calibration.encoder->rate_hz);
-  if (calibration.lasers) laser_.period_ns = period(calibration.lasers->rate_hz);
+  if (const auto& encoder = calibration.encoder) {
+    encoder_.period_ns = period(encoder->rate_hz);
+    encoder_.time_offset = encoder->time_offset;
+  }
+  if (const auto& lasers = calibration.lasers) {
+    laser_.period_ns = period(lasers->rate_hz);
+    laser_.time_offset = lasers->time_offset;
+  }
   ::sem_init(&news_, 0, 0);
   thread_ = std::thread([this] { run(); });
 }
@@ -70,13 +76,13 @@ bool LiveEstimator::add_imu(const ImuSample& sample, std::optional<NavState>* st
 
 bool LiveEstimator::add_encoder(const EncoderSample& sample) {
   const bool taken = queued_.add_encoder(sample);
-  if (taken) encoder_.newest_ns = sample.t_ns;
+  if (taken) encoder_.newest_ns = later_by(encoder_.time_offset, sample.t_ns);
   return taken;
 }
 
 bool LiveEstimator::add_laser(const QueuedOdometry::Ranges& ranges) {
   const bool taken = queued_.add_laser(ranges);
-  if (taken) laser_.newest_ns = ranges.t_ns;
+  if (taken) laser_.newest_ns = later_by(laser_.time_offset, ranges.t_ns);
   return taken;
 }
 

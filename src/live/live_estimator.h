@@ -71,8 +71,9 @@ class LiveEstimator {
  private:
   /// A stream whose readings belong before the frames that are later.
   struct Beside {
-    std::atomic<TimeNs> newest_ns{0};
-    TimeNs period_ns = 0;  ///< 0: there is no such sensor
+    std::atomic<TimeNs> newest_ns{0};  ///< IMU time
+    TimeNs period_ns = 0;              ///< 0: there is no such sensor
+    double time_offset = 0.0;          ///< [s] added to a stamp gives IMU time
   };
 
   void run();

@@ -89,10 +89,10 @@ class Sensor {
 
 class Player::Feed {
  public:
-  Feed(Intake& intake, TimeNs first_ns)
+  Feed(Intake& intake, const Calibration& calibration, TimeNs first_ns)
       : imu_(intake, first_ns, kAhead),
-        encoder_(intake, first_ns, kAhead),
-        laser_(intake, first_ns, kAhead),
+        encoder_(intake, later_by(calibration.encoder ? -calibration.encoder->time_offset : 0.0, first_ns), kAhead),
+        laser_(intake, later_by(calibration.lasers ? -calibration.lasers->time_offset : 0.0, first_ns), kAhead),
         camera_(intake, first_ns, kFramesAhead) {}
 
   void deal(Sample sample) {
@@ -125,7 +125,7 @@ Player::Player(Recording recording) : recording_(std::move(recording)) {}
 Player::~Player() { stop(); }
 
 void Player::start(Intake& intake) {
-  feed_ = std::make_unique<Feed>(intake, recording_.span().first_ns);
+  feed_ = std::make_unique<Feed>(intake, recording_.calibration(), recording_.span().first_ns);
   dealer_ = std::thread([this] { deal(); });
 }
 

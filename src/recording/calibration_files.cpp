@@ -128,6 +128,8 @@ EncoderCalibration read_encoder(const fs::path& file) {
   encoder.track_width = map.get<double>("wheel_separation");
   encoder.noise_counts = map.get<double>("noise_counts");
   encoder.stamp_sigma = map.sigma("stamp_sigma").value_or(0.0);
+  encoder.time_offset = map.get_or("timeshift_encoder_imu", 0.0);
+  encoder.time_offset_sigma = map.sigma("timeshift_encoder_imu_sigma");
   encoder.T_BO_sigma = pose_sigma(map, "T_BS_sigma");
   encoder.wheel_radius_sigma = map.sigma("wheel_radius_sigma");
   encoder.wheel_radius_difference_sigma = map.sigma("wheel_radius_difference_sigma");
@@ -154,6 +156,8 @@ LaserCalibration read_lasers(const fs::path& file) {
   lasers.range_min = range[0];
   lasers.range_max = range[1];
   lasers.noise = map.get<double>("noise");
+  lasers.time_offset = map.get_or("timeshift_laser_imu", 0.0);
+  lasers.time_offset_sigma = map.sigma("timeshift_laser_imu_sigma");
   lasers.offset_sigma = map.sigma("offset_sigma");
   return lasers;
 }

@@ -100,6 +100,8 @@ void write_encoder(const EncoderCalibration& encoder, const fs::path& folder, co
   file.sigma("wheel_separation_sigma", encoder.track_width_sigma, "m");
   file.value("noise_counts", encoder.noise_counts);
   if (encoder.stamp_sigma > 0.0) file.value("stamp_sigma", encoder.stamp_sigma, "s");
+  file.value("timeshift_encoder_imu", encoder.time_offset, "s");
+  file.sigma("timeshift_encoder_imu_sigma", encoder.time_offset_sigma, "s");
   file.close();
 }
 
@@ -119,6 +121,8 @@ void write_lasers(const LaserCalibration& lasers, const fs::path& folder, const 
   }
   file.list("range", std::array<double, 2>{lasers.range_min, lasers.range_max}, 2);
   file.value("noise", lasers.noise, "m");
+  file.value("timeshift_laser_imu", lasers.time_offset, "s");
+  file.sigma("timeshift_laser_imu_sigma", lasers.time_offset_sigma, "s");
   file.sigma("offset_sigma", lasers.offset_sigma, "m");
   file.close();
 }

@@ -147,12 +147,22 @@ void check_imu(const ImuCalibration& imu, Findings& findings) {
   findings.require_positive("imu0: accelerometer_random_walk", imu.accel_random_walk);
 }
 
+void check_time_offset(const std::string& where, double offset, Findings& findings) {
+  if (!(std::abs(offset) <= kLargestTimeOffset)) {
+    findings.error(
+        where, Findings::text(offset) + " s: not a number of seconds, at most " + Findings::text(kLargestTimeOffset));
+  } else if (std::abs(offset) > kMostTimeOffset) {
+    findings.warning(where, Findings::text(offset) + " s");
+  }
+}
+
 void check_encoder(const EncoderCalibration& encoder, Findings& findings) {
   check_pose(encoder.T_BO, "encoder0: T_BS", findings);
   findings.require_positive("encoder0: resolution", static_cast<double>(encoder.resolution));
   for (const double radius : encoder.wheel_radius) findings.require_positive("encoder0: wheel_radius", radius);
   findings.require_positive("encoder0: wheel_separation", encoder.track_width);
   findings.require_positive("encoder0: noise_counts", encoder.noise_counts);
+  check_time_offset("encoder0: timeshift_encoder_imu", encoder.time_offset, findings);
 }
 
 void check_lasers(const LaserCalibration& lasers, Findings& findings) {
@@ -163,6 +173,7 @@ void check_lasers(const LaserCalibration& lasers, Findings& findings) {
     }
   }
   findings.require_positive("laser0: noise", lasers.noise);
+  check_time_offset("laser0: timeshift_laser_imu", lasers.time_offset, findings);
   if (!(lasers.range_min >= 0.0 && lasers.range_min < lasers.range_max)) {
     findings.error("laser0: range", "not [least, most]");
   }
@@ -176,13 +187,7 @@ std::vector<Finding> check_calibration(const Calibration& calibration) {
     check_camera(calibration.cameras[i], "cam" + std::to_string(i), findings);
   }
   if (calibration.cameras.size() == 2) check_stereo(calibration.cameras[0], calibration.cameras[1], findings);
-  const double offset = calibration.camera_time_offset;
-  if (!(std::abs(offset) <= kLargestTimeOffset)) {
-    findings.error("cam0: timeshift_cam_imu", Findings::text(offset) + " s: not a number of seconds, at most " +
-                                                  Findings::text(kLargestTimeOffset));
-  } else if (std::abs(offset) > kMostTimeOffset) {
-    findings.warning("cam0: timeshift_cam_imu", Findings::text(offset) + " s");
-  }
+  check_time_offset("cam0: timeshift_cam_imu", calibration.camera_time_offset, findings);
   check_imu(calibration.imu, findings);
   if (calibration.encoder) check_encoder(*calibration.encoder, findings);
   if (calibration.lasers) check_lasers(*calibration.lasers, findings);

@@ -94,6 +94,8 @@ void write_encoder(const EncoderCalibration& encoder, const fs::path& folder) {
   file.line("wheel_radius", list(encoder.wheel_radius)).number("wheel_separation", encoder.track_width);
   file.number("noise_counts", encoder.noise_counts);
   if (encoder.stamp_sigma > 0.0) file.number("stamp_sigma", encoder.stamp_sigma);
+  file.number("timeshift_encoder_imu", encoder.time_offset);
+  file.number("timeshift_encoder_imu_sigma", encoder.time_offset_sigma);
   file.sigma("T_BS_sigma", encoder.T_BO_sigma).number("wheel_radius_sigma", encoder.wheel_radius_sigma);
   file.number("wheel_radius_difference_sigma", encoder.wheel_radius_difference_sigma);
   file.number("wheel_separation_sigma", encoder.track_width_sigma);
@@ -106,6 +108,8 @@ void write_lasers(const LaserCalibration& lasers, const fs::path& folder) {
     file.line("  - {name", beam.name + ", origin: " + list(beam.p_BL) + ", direction: " + list(beam.d_B) + "}");
   }
   file.line("range", list(std::array<double, 2>{lasers.range_min, lasers.range_max})).number("noise", lasers.noise);
+  file.number("timeshift_laser_imu", lasers.time_offset);
+  file.number("timeshift_laser_imu_sigma", lasers.time_offset_sigma);
   file.number("offset_sigma", lasers.offset_sigma);
 }
 

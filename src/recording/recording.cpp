@@ -40,7 +40,7 @@ class Recording::Impl {
   std::optional<Sample> next() {
     // In the order of precedence at equal times: a later one must be strictly earlier.
     const std::array<std::optional<TimeNs>, 4> times{
-        stamp(next_imu_), stamp(next_encoder_), stamp(next_laser_),
+        stamp(next_imu_, 0.0), stamp(next_encoder_, encoder_offset_), stamp(next_laser_, laser_offset_),
         next_frame_ ? std::optional(next_frame_->arrival_ns) : std::nullopt};
     std::size_t earliest = 0;
     for (std::size_t i = 1; i < times.size(); ++i) {
@@ -81,8 +81,8 @@ class Recording::Impl {
   }
 
   template <typename T>
-  static std::optional<TimeNs> stamp(const std::optional<T>& sample) {
-    return sample ? std::optional<TimeNs>(sample->t_ns) : std::nullopt;
+  static std::optional<TimeNs> stamp(const std::optional<T>& sample, double offset) {
+    return sample ? std::optional<TimeNs>(later_by(offset, sample->t_ns)) : std::nullopt;
   }
 
   template <typename T>
@@ -106,6 +106,8 @@ class Recording::Impl {
   std::size_t logged_ = 0;  // kinds of them
   std::unique_ptr<SampleSource> source_;
   Calibration calibration_;
+  double encoder_offset_ = calibration_.encoder ? calibration_.encoder->time_offset : 0.0;  // [s] to IMU time
+  double laser_offset_ = calibration_.lasers ? calibration_.lasers->time_offset : 0.0;      // the same
   TimeSpan span_;
   std::unique_ptr<FrameQueue> frames_;  // after the source, which its thread uses
   std::optional<ImuSample> next_imu_;

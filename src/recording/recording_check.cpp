@@ -47,20 +47,21 @@ class Check {
 
  private:
   void read(Recording& recording) {
-    const std::vector<CameraCalibration>& cameras = recording.calibration().cameras;
-    const auto camera_offset_ns = static_cast<TimeNs>(std::llround(1e9 * recording.calibration().camera_time_offset));
+    const Calibration& calibration = recording.calibration();
+    const std::vector<CameraCalibration>& cameras = calibration.cameras;
     const auto sort = Overloaded{[&](const ImuSample& s) {
                                    imu_timing_.add(s.t_ns);
                                    imu_.add(s);
                                  },
                                  [&](const EncoderSample& s) {
                                    encoder_timing_.add(s.t_ns);
-                                   standing_.add(s, *recording.calibration().encoder);
+                                   const TimeNs t_ns = later_by(calibration.encoder->time_offset, s.t_ns);
+                                   standing_.add({t_ns, s.left_count, s.right_count}, *calibration.encoder);
                                  },
                                  [&](const LaserSample& s) { laser_timing_.add(s.t_ns); },
                                  [&](const RecordedFrame& s) {
                                    camera_timing_.add(s.t_ns);
-                                   standing_.add(s.t_ns + camera_offset_ns, s.left);
+                                   standing_.add(later_by(calibration.camera_time_offset, s.t_ns), s.left);
                                    judge_size("cam0", s.left, cameras.front(), left_seen_);
                                    judge_size("cam1", s.right, cameras.back(), right_seen_);
                                  }};
@@ -79,17 +80,25 @@ class Check {
 
   void describe_streams(const Calibration& calibration) {
     add_stream("imu0", calibration.imu.rate_hz, imu_timing_);
-    if (calibration.encoder) add_stream("encoder0", calibration.encoder->rate_hz, encoder_timing_);
-    if (calibration.lasers) add_stream("laser0", calibration.lasers->rate_hz, laser_timing_);
+    if (const auto& encoder = calibration.encoder) {
+      add_stream("encoder0", encoder->rate_hz, encoder_timing_, encoder->time_offset);
+    }
+    if (const auto& lasers = calibration.lasers) {
+      add_stream("laser0", lasers->rate_hz, laser_timing_, lasers->time_offset);
+    }
     if (!calibration.cameras.empty()) {
-      add_stream(calibration.cameras.size() == 2 ? "cam0+cam1" : "cam0", calibration.cameras[0].rate_hz,
-                 camera_timing_);
+      add_stream(calibration.cameras.size() == 2 ? "cam0+cam1" : "cam0", calibration.cameras[0].rate_hz, camera_timing_,
+                 calibration.camera_time_offset);
     }
   }
 
-  void add_stream(const std::string& name, double nominal_rate_hz, const StreamTiming& timing) {
+  void add_stream(const std::string& name, double nominal_rate_hz, const StreamTiming& timing,
+                  double time_offset = 0.0) {
     StreamReport stream{name, nominal_rate_hz, timing.report(), 0.0};
-    stream.covered_by_imu = coverage(stream.timing, imu_timing_.report());
+    TimingReport by_imu = stream.timing;
+    by_imu.first_ns = later_by(time_offset, by_imu.first_ns);
+    by_imu.last_ns = later_by(time_offset, by_imu.last_ns);
+    stream.covered_by_imu = coverage(by_imu, imu_timing_.report());
     judge_stream(stream);
     report_.streams.push_back(stream);
   }

@@ -13,9 +13,14 @@ TEST_CASE("calibration: parameters of a wrong calibration lead to the true one")
   options.duration = 2.0;
   options.calibration_error = 5.0;
   const simulator::Simulation simulation(options);
-  const Calibration& given = simulation.calibration();
-  const Calibration& truth = simulation.true_calibration();
+  Calibration given = simulation.calibration();
+  given.encoder->time_offset = 0.01;
+  Calibration truth = simulation.true_calibration();
+  truth.encoder->time_offset = -0.02;
+  truth.lasers->time_offset = 0.03;
   const Calibration made = applied(given, errors_of(given, truth));
+  CHECK(made.encoder->time_offset == doctest::Approx(-0.02));
+  CHECK(made.lasers->time_offset == doctest::Approx(0.03));
   for (std::size_t i = 0; i < 2; ++i) {
     CHECK(made.cameras[i].T_BC.isApprox(truth.cameras[i].T_BC, 1e-9));
     CHECK(made.cameras[i].fu == doctest::Approx(truth.cameras[i].fu));
@@ -36,6 +41,11 @@ TEST_CASE("calibration: what sensor.yaml states is the prior; a sketch where it 
   CHECK(priors_of(given).wheel_radius == doctest::Approx(0.05));
   given.encoder->wheel_radius_sigma = 0.001;
   CHECK(priors_of(given).wheel_radius == doctest::Approx(0.001 / 0.075));
+  given.lasers = LaserCalibration{};
+  CHECK(priors_of(given).encoder_time == 2e-3);
+  CHECK(priors_of(given).laser_time == 2e-3);
+  given.encoder->time_offset_sigma = 5e-3;
+  given.lasers->time_offset_sigma = 6e-3;
   given.cameras.resize(2);
   for (CameraCalibration& camera : given.cameras) camera.fu = camera.fv = 400.0;
   given.cameras[1].intrinsics_sigma = IntrinsicsSigma{0.8, 0.3};
@@ -43,7 +53,11 @@ TEST_CASE("calibration: what sensor.yaml states is the prior; a sketch where it 
   CHECK(priors.focal_length[0] == 5e-3);
   CHECK(priors.focal_length[1] / 2e-3 == doctest::Approx(1.0));
   CHECK(priors.principal_point[1] == 0.3);
+  CHECK(priors.encoder_time == 5e-3);
+  CHECK(priors.laser_time == 6e-3);
   const Calibration stated = with_priors(given, priors);
+  CHECK(stated.encoder->time_offset_sigma == 5e-3);
+  CHECK(stated.lasers->time_offset_sigma == 6e-3);
   CHECK(stated.cameras[0].intrinsics_sigma->focal_length == doctest::Approx(2.0));
   CHECK(stated.cameras[1].intrinsics_sigma->focal_length == doctest::Approx(0.8));
 }

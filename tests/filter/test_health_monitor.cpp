@@ -24,7 +24,7 @@ using Records = std::array<SourceRecord, kSourceCount>;
 
 /// A sound vehicle that rolls, at 20 frames a second; what a test changes goes wrong.
 struct Drive {
-  HealthMonitor monitor{{}, vehicle(), true, true};
+  HealthMonitor monitor{vehicle(), true, true};
   HealthMonitor::Frame frame;
   Records records{};
   double t = 0.0;
@@ -324,7 +324,7 @@ TEST_CASE("health: one camera whose features the gate refuses contradicts the st
   Calibration calibration = vehicle();
   calibration.cameras.resize(1);
   Drive drive;
-  drive.monitor = HealthMonitor({}, calibration, false, false);
+  drive.monitor = HealthMonitor(calibration, false, false);
   drive.frame.statistics.stereo = 0;
   drive.frame.statistics.on_ground = false;
   drive.frame.statistics.wheel_rows_used = 0;
@@ -402,7 +402,7 @@ TEST_CASE("health: without cameras too, the estimate is lost when nothing but in
   Calibration calibration = vehicle();
   calibration.cameras.clear();
   Drive drive;
-  drive.monitor = HealthMonitor({}, calibration, true, true);
+  drive.monitor = HealthMonitor(calibration, true, true);
   drive.frame.image = false;
   drive.frame.statistics.tracks = drive.frame.statistics.stereo = 0;
   drive.frame.agreement = FrameAgreement{};

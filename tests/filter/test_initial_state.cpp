@@ -125,4 +125,10 @@ TEST_CASE("initial state: standard deviations that cannot be are named") {
   CHECK(names(reason([](C& c) { c.encoder->wheel_radius_difference_sigma = 0.0; }), "wheel_radius_difference_sigma"));
   CHECK(names(reason([](C& c) { c.encoder->track_width_sigma = 0.0; }), "track_width_sigma"));
   CHECK(names(reason([](C& c) { c.lasers->offset_sigma = 0.0; }), "offset_sigma"));
+  CHECK(names(reason([](C& c) { c.encoder->time_offset_sigma = 0.0; }), "the encoder's time_offset_sigma"));
+  CHECK(names(reason([](C& c) { c.lasers->time_offset_sigma = -1.0; }), "the lasers' time_offset_sigma"));
+  for (const double offset : {std::numeric_limits<double>::quiet_NaN(), 1e300, -4000.0}) {
+    CHECK(names(reason([&](C& c) { c.encoder->time_offset = offset; }), "the encoder's time_offset must be a number"));
+    CHECK(names(reason([&](C& c) { c.lasers->time_offset = offset; }), "the lasers' time_offset must be a number"));
+  }
 }

@@ -1,5 +1,5 @@
 // Wheels and inertial sensors that are mounted as the calibration says, and not.
-#include "filter/health/mounting_watch.h"
+#include "filter/sources/wheels/mounting_watch.h"
 
 #include <doctest/doctest.h>
 

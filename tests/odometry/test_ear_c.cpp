@@ -66,6 +66,7 @@ ear_calibration to_c(const Calibration& from) {
     to.wheel_radius[1] = from.encoder->wheel_radius[1];
     to.track_width = from.encoder->track_width;
     to.encoder_noise_counts = from.encoder->noise_counts;
+    to.encoder_time_offset = from.encoder->time_offset;
   }
   if (from.lasers) {
     to.beam_count = static_cast<std::int32_t>(from.lasers->beams.size());
@@ -77,6 +78,7 @@ ear_calibration to_c(const Calibration& from) {
     to.range_min = from.lasers->range_min;
     to.range_max = from.lasers->range_max;
     to.laser_noise = from.lasers->noise;
+    to.laser_time_offset = from.lasers->time_offset;
   }
   return to;
 }
@@ -438,6 +440,10 @@ TEST_CASE("C interface: what cannot be used is refused with its reason") {
   for (const double offset : {std::nan(""), 1e300, -4000.0}) {
     const auto spoil = [offset](C& c, S&) { c.camera_time_offset = offset; };
     CHECK(reason_of(spoil).find("camera_time_offset") != std::string::npos);
+    const auto spoil_encoder = [offset](C& c, S&) { c.encoder_time_offset = offset; };
+    CHECK(reason_of(spoil_encoder).find("the encoder's time_offset") != std::string::npos);
+    const auto spoil_lasers = [offset](C& c, S&) { c.laser_time_offset = offset; };
+    CHECK(reason_of(spoil_lasers).find("the lasers' time_offset") != std::string::npos);
   }
   CHECK(reason_of([](C& c, S&) { c.wheel_radius_sigma = -1e-3; }).find("wheel_radius_sigma") != std::string::npos);
   CHECK(reason_of([](C& c, S&) { c.cameras[1].rotation_sigma = 1e-3; }).find("pose_sigma") != std::string::npos);

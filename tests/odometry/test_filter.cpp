@@ -353,3 +353,45 @@ TEST_CASE("filter: settings and calibrations that cannot be are refused by name"
   calibration.encoder.reset();
   CHECK_THROWS_AS(Filter(FilterConfig{}, calibration), std::invalid_argument);
 }
+
+TEST_CASE("filter: wheels and lasers whose stamps are off by what the calibration says give the same estimates") {
+  const simulator::Simulation simulation = simulate("wave1", 15.0, false);
+  const auto run = [&](TimeNs encoder_ns, TimeNs laser_ns, double encoder_offset, double laser_offset) {
+    Calibration calibration = simulation.calibration();
+    calibration.encoder->time_offset = encoder_offset;
+    calibration.lasers->time_offset = laser_offset;
+    Filter filter(FilterConfig{}, calibration);
+    experiments::ReplayOptions options;
+    options.change_encoder = [&](EncoderSample sample) {
+      sample.t_ns += encoder_ns;
+      return sample;
+    };
+    options.change_laser = [&](LaserSample sample) {
+      sample.t_ns += laser_ns;
+      return sample;
+    };
+    std::vector<Estimate> estimates;
+    const auto keep = [&](TimeNs /*stamp_ns*/, const Estimate& estimate) { estimates.push_back(estimate); };
+    experiments::replay(simulation, filter, keep, options);
+    CHECK(filter.input_counts().encoder.accepted > 1000);
+    CHECK(filter.input_counts().laser.accepted > 500);
+    return estimates;
+  };
+  const auto equal = [](const std::vector<Estimate>& a, const std::vector<Estimate>& b) {
+    bool same = a.size() == b.size();
+    for (std::size_t i = 0; same && i < a.size(); ++i) {
+      same = a[i].state.p_WB == b[i].state.p_WB && a[i].state.q_WB.coeffs() == b[i].state.q_WB.coeffs() &&
+             a[i].covariance == b[i].covariance && a[i].terrain.slope_along == b[i].terrain.slope_along;
+    }
+    return same;
+  };
+  const std::vector<Estimate> plain = run(0, 0, 0.0, 0.0);
+  REQUIRE(plain.size() > 300);
+  CHECK(plain.back().terrain.known);
+  CHECK(equal(run(50'000'000, 0, -0.05, 0.0), plain));
+  CHECK(equal(run(-50'000'000, 0, 0.05, 0.0), plain));
+  CHECK(equal(run(0, 50'000'000, 0.0, -0.05), plain));
+  CHECK(equal(run(-3'500'000'000'000, 20'000'000, 3500.0, -0.02), plain));
+  CHECK_FALSE(equal(run(50'000'000, 0, 0.0, 0.0), plain));
+  CHECK_FALSE(equal(run(0, 50'000'000, 0.0, 0.0), plain));
+}

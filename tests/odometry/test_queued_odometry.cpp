@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cstdint>
 #include <optional>
+#include <utility>
+#include <vector>
 
 #include "src/queued_odometry.h"
 #include "tools/simulator/film.h"
@@ -90,6 +92,54 @@ TEST_CASE("queues: one inertial stamp far ahead costs no frame, and the state at
   CHECK(odometry.odometry().input_counts().camera.far_ahead == 0);
   CHECK(estimates >= 16);
   CHECK(live > 200);
+}
+
+/// Wheels and lasers without cameras, whose stamps are off by this [s], as the calibration says; a step every 50 ms.
+std::vector<Estimate> drive_by_clocks(const simulator::Simulation& simulation, double encoder_late, double laser_late) {
+  Calibration calibration = simulation.calibration();
+  calibration.cameras.clear();
+  calibration.encoder->time_offset = -encoder_late;
+  calibration.lasers->time_offset = -laser_late;
+  QueuedOdometry odometry(Config{}, calibration, QueueCapacity{});
+  std::vector<Estimate> estimates;
+  for (const simulator::Delivery& delivery : simulation.deliveries()) {
+    if (delivery.stream == simulator::SensorStream::encoder) {
+      EncoderSample sample = simulation.encoders()[delivery.index];
+      sample.t_ns = later_by(encoder_late, sample.t_ns);
+      REQUIRE(odometry.add_encoder(sample));
+    } else if (delivery.stream == simulator::SensorStream::laser) {
+      const LaserSample& sample = simulation.lasers()[delivery.index];
+      QueuedOdometry::Ranges ranges{later_by(laser_late, sample.t_ns), {}};
+      std::copy(sample.range.begin(), sample.range.end(), ranges.range.begin());
+      REQUIRE(odometry.add_laser(ranges));
+    } else if (delivery.stream == simulator::SensorStream::imu) {
+      const ImuSample& sample = simulation.imu()[delivery.index];
+      REQUIRE(odometry.add_imu(sample));
+      if (delivery.index % 10 != 9) continue;
+      if (const auto estimate = odometry.step(sample.t_ns - 20'000'000)) estimates.push_back(*estimate);
+    }
+  }
+  return estimates;
+}
+
+TEST_CASE("queues: readings of other clocks are handed over where they belong") {
+  simulator::Options options;
+  options.seed = 11;
+  options.duration = 8.0;
+  const simulator::Simulation simulation(options);
+  const std::vector<Estimate> plain = drive_by_clocks(simulation, 0.0, 0.0);
+  REQUIRE(plain.size() > 50);
+  CHECK(plain.back().state.v_W.norm() > 0.1);
+  for (const auto& [encoder_late, laser_late] :
+       {std::pair(0.05, -0.03), std::pair(-0.05, 0.3), std::pair(1800.0, 0.0)}) {
+    CAPTURE(encoder_late);
+    const std::vector<Estimate> shifted = drive_by_clocks(simulation, encoder_late, laser_late);
+    REQUIRE(shifted.size() == plain.size());
+    for (std::size_t i = 0; i < plain.size(); ++i) {
+      CHECK(shifted[i].state.p_WB == plain[i].state.p_WB);
+      CHECK(shifted[i].covariance == plain[i].covariance);
+    }
+  }
 }
 
 TEST_CASE("queues: a frame that was taken is handed on with its pixels, and later ones are as they came") {

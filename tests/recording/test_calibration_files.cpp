@@ -102,6 +102,26 @@ TEST_CASE("calibration: the time offset may stand in cam0's sensor.yaml") {
   CHECK(load(folder.path()).camera_time_offset == 0.0015);
 }
 
+TEST_CASE("calibration: the time offsets of wheels and lasers stand in their sensor.yaml") {
+  const TempFolder folder;
+  write_full_recording(folder.path());
+  CHECK(load(folder.path()).encoder->time_offset == 0.0);
+  CHECK(load(folder.path()).lasers->time_offset == 0.0);
+  write_text(folder / "encoder0/sensor.yaml",
+             kEncoderYaml + "timeshift_encoder_imu: -0.021\ntimeshift_encoder_imu_sigma: 0.001\n");
+  write_text(folder / "laser0/sensor.yaml",
+             kLaserYaml + "timeshift_laser_imu: 0.034\ntimeshift_laser_imu_sigma: 0.002\n");
+  const Calibration c = load(folder.path());
+  CHECK(c.encoder->time_offset == -0.021);
+  CHECK(c.encoder->time_offset_sigma == 0.001);
+  CHECK(c.lasers->time_offset == 0.034);
+  CHECK(c.lasers->time_offset_sigma == 0.002);
+  CHECK(check_calibration(c).empty());
+  write_text(folder / "encoder0/sensor.yaml", kEncoderYaml + "timeshift_encoder_imu: soon\n");
+  CHECK(contains(input_error_of([&] { load(folder.path()); }),
+                 "encoder0/sensor.yaml:9: timeshift_encoder_imu: 'soon' is not a number"));
+}
+
 TEST_CASE("calibration: names of lens models") {
   const TempFolder folder;
   write_full_recording(folder.path());
@@ -342,6 +362,8 @@ TEST_CASE("calibration: standard deviations that cannot be are errors that name 
                  "wheel_separation_sigma: '-0.1' is not positive"));
   CHECK(contains(error_with("imu0", "gyroscope_bias_sigma: .inf"),
                  "gyroscope_bias_sigma: '.inf' is not a finite number"));
+  CHECK(contains(error_with("encoder0", "timeshift_encoder_imu_sigma: 0"),
+                 ": timeshift_encoder_imu_sigma: '0' is not positive"));
   CHECK(contains(error_with("laser0", "offset_sigma: .nan"), "offset_sigma: '.nan' is not a finite number"));
   CHECK(contains(error_with("cam0", "T_BS_sigma: {rotation: 0.1}"), ": T_BS_sigma: {rotation: rad"));
   CHECK(contains(error_with("cam0", "T_BS_sigma: 0.1"), "T_BS_sigma: keys and values expected"));
@@ -400,6 +422,10 @@ TEST_CASE("calibration: what is written comes back, in the place of the recordin
   c.encoder->track_width_sigma = 3e-4;
   c.encoder->T_BO_sigma = PoseSigma{1e-3, 2e-3};
   c.encoder->stamp_sigma = 0.001;
+  c.encoder->time_offset = -0.0123456789;
+  c.encoder->time_offset_sigma = 2e-4;
+  c.lasers->time_offset = 0.0345;
+  c.lasers->time_offset_sigma = 3e-4;
   c.lasers->beams[0].p_BL.x() += 0.002;
   c.lasers->offset_sigma = 4e-3;
   write_calibration(c, folder / "result", "by a test", {{0.001, 0.002}});
@@ -435,6 +461,10 @@ TEST_CASE("calibration: what is written comes back, in the place of the recordin
   CHECK(back.encoder->wraps == c.encoder->wraps);
   CHECK(back.encoder->noise_counts == c.encoder->noise_counts);
   CHECK(back.encoder->stamp_sigma == 0.001);
+  CHECK(back.encoder->time_offset == -0.0123456789);
+  CHECK(back.encoder->time_offset_sigma == 2e-4);
+  CHECK(back.lasers->time_offset == 0.0345);
+  CHECK(back.lasers->time_offset_sigma == 3e-4);
   REQUIRE(back.lasers->beams.size() == c.lasers->beams.size());
   CHECK(back.lasers->beams[0].name == c.lasers->beams[0].name);
   CHECK(back.lasers->beams[0].p_BL.isApprox(c.lasers->beams[0].p_BL, 1e-10));

@@ -122,6 +122,21 @@ TEST_CASE("check_calibration: the cameras' clock") {
   }
 }
 
+TEST_CASE("check_calibration: the clocks of wheels and lasers") {
+  for (const double offset : {std::nan(""), -HUGE_VAL, 3601.0, 1e12, 0.6}) {
+    CAPTURE(offset);
+    const bool odd = offset == 0.6;
+    const Severity severity = odd ? Severity::warning : Severity::error;
+    const char* const words = odd ? "0.6 s" : "not a number of seconds, at most 3600";
+    Calibration c = good();
+    c.encoder->time_offset = offset;
+    check_one(c, severity, "encoder0: timeshift_encoder_imu", words);
+    c = good();
+    c.lasers->time_offset = offset;
+    check_one(c, severity, "laser0: timeshift_laser_imu", words);
+  }
+}
+
 TEST_CASE("check_sensors: a camera or wheels are needed") {
   Calibration c = good();
   CHECK_FALSE(check_sensors(c));

@@ -61,6 +61,26 @@ TEST_CASE("recording: all sensors in time order, of equal times IMU, encoder, la
   }
 }
 
+TEST_CASE("recording: wheels and lasers come where they belong by the IMU's clock, with the stamps that they had") {
+  const TempFolder folder;
+  write_full_recording(folder / "mav0");
+  write_text(folder / "mav0/encoder0/sensor.yaml", kEncoderYaml + "timeshift_encoder_imu: 0.05\n");
+  write_text(folder / "mav0/laser0/sensor.yaml", kLaserYaml + "timeshift_laser_imu: -0.03\n");
+  const Contents all = read_all(folder.path());
+  REQUIRE(all.samples.size() == 101 + 101 + 51 + 10);
+  CHECK(all.encoder[1].t_ns == 10'000'000);
+  CHECK(all.laser[1].t_ns == 20'000'000);
+  const auto imu_time = [](const Sample& sample) {
+    return time_of(sample) + (sample.index() == 1 ? 50'000'000 : sample.index() == 2 ? -30'000'000 : 0);
+  };
+  for (std::size_t i = 1; i < all.samples.size(); ++i) {
+    CAPTURE(i);
+    const TimeNs before = imu_time(all.samples[i - 1]);
+    const TimeNs now = imu_time(all.samples[i]);
+    CHECK((before < now || (before == now && all.samples[i - 1].index() < all.samples[i].index())));
+  }
+}
+
 TEST_CASE("recording: values arrive as written") {
   const TempFolder folder;
   write_full_recording(folder / "mav0");
@@ -361,6 +381,14 @@ TEST_CASE("recording: a lower camera rate keeps evenly spaced frames, stamps tha
   write_text(folder / "mav0/cam0/data.csv", csv);
   CHECK(kept(10.0).size() == 10);
   CHECK(kept(5.0) == std::vector<int>{0, 2, 4, 6, 8});
+}
+
+TEST_CASE("recording: a clock that is hours off is an error that names the sensor and the key") {
+  const TempFolder folder;
+  write_full_recording(folder / "mav0");
+  write_text(folder / "mav0/laser0/sensor.yaml", kLaserYaml + "timeshift_laser_imu: 7200\n");
+  CHECK(contains(input_error_of([&] { read_all(folder.path()); }),
+                 "laser0: timeshift_laser_imu: 7200 s: not a number of seconds, at most 3600"));
 }
 
 TEST_CASE("recording: a calibration that cannot be is an error, an odd one a warning") {

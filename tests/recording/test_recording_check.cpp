@@ -191,6 +191,18 @@ TEST_CASE("check: streams that do not meet, gaps, wrong rates") {
   CHECK(has_finding(report, Severity::warning, "encoder0", "33.3 Hz, but its calibration says 100 Hz"));
 }
 
+TEST_CASE("check: streams meet by the IMU's clock") {
+  const TempFolder folder;
+  write_full_recording(folder / "mav0");
+  write_text(folder / "mav0/laser0/data.csv", "#t\n5000000000,0.1,0.1,0.1\n5020000000,0.1,0.1,0.1\n");
+  write_text(folder / "mav0/laser0/sensor.yaml", kLaserYaml + "timeshift_laser_imu: -4.5\n");
+  const RecordingReport report = check_recording(folder.path(), {});
+  CHECK(report.usable());
+  CHECK(has_finding(report, Severity::warning, "laser0: timeshift_laser_imu", "-4.5 s"));
+  REQUIRE(report.streams.size() == 4);
+  CHECK(report.streams[2].covered_by_imu == 1.0);
+}
+
 TEST_CASE("check: a calibration that cannot be is reported with the rest") {
   const TempFolder folder;
   write_full_recording(folder / "mav0");

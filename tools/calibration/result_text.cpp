@@ -20,10 +20,6 @@ using Json = nlohmann::ordered_json;
   return text.data();
 }
 
-std::string clock_line(const char* sensor, double offset) {
-  return line("%s: add %.2f ms to its stamps; ear run takes them as they are\n", sensor, 1e3 * offset);
-}
-
 /// One line per number.
 std::string table_of(const std::vector<Finding>& findings) {
   std::string text =
@@ -102,8 +98,6 @@ std::string to_text(const Result& result) {
     any = true;
     text += "  " + finding.name + ": " + finding.motion_wanted + "\n";
   }
-  if (std::abs(result.encoder_time) > 1e-3) text += clock_line("encoder0", result.encoder_time);
-  if (std::abs(result.laser_time) > 1e-3) text += clock_line("laser0", result.laser_time);
   text += noise_text(result.calibration, result.noise);
   if (result.left_out > 0.0) text += line("%.1f s of the drives were left out: no estimate there\n", result.left_out);
   return text;
@@ -116,8 +110,6 @@ std::string to_json(const Result& result) {
                     {"slip", result.noise.roll.slip},
                     {"common_slip", result.noise.roll.common},
                     {"beam", result.noise.beam}}},
-                  {"encoder_time_offset", result.encoder_time},
-                  {"laser_time_offset", result.laser_time},
                   {"left_out_s", result.left_out}};
   return json.dump(1) + "\n";
 }

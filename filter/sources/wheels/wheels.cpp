@@ -14,10 +14,15 @@ constexpr double kLifting = 0.3;  // [s] chosen: after wheels that leave the gro
 }  // namespace
 
 Wheels::Wheels(const OdometerConfig& config, const Calibration& calibration, bool sees_ground)
-    : config_(config), encoder_(*calibration.encoder), imu_(calibration.imu), sees_ground_(sees_ground) {}
+    : config_(config),
+      encoder_(*calibration.encoder),
+      imu_(calibration.imu),
+      sees_ground_(sees_ground),
+      mounting_(config, *calibration.encoder) {}
 
 void Wheels::update(const WheelIncrement& increment, const Context& context, Ekf& ekf, Records& records) {
   const State& x = ekf.state();
+  mounting_.add(increment, context.imu, x.imu.b_g);
   const BodyMotion motion = motion_at(middle_of(increment), x.imu, context.imu);
   MeanRate rate = context.imu.mean_rate(increment.from_ns, increment.to_ns);
   rate.noise_factor *= context.gyro_noise;

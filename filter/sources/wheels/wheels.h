@@ -12,6 +12,7 @@
 #include "filter/ekf/noise_score.h"
 #include "filter/ekf/records.h"
 #include "filter/ingest/imu_buffer.h"
+#include "filter/sources/wheels/mounting_watch.h"
 #include "filter/sources/wheels/wheel_rows.h"
 
 namespace ear {
@@ -40,6 +41,9 @@ class Wheels {
   /// Did the velocity not lie in the ground just now, as when the wheels leave the ground or meet it?
   [[nodiscard]] bool lifting(TimeNs t_ns) const;
 
+  /// Does the calibration seem to exchange or reverse axes, as far as they rolled on the ground?
+  [[nodiscard]] bool misaligned() const { return mounting_.contradicts(); }
+
   /// The state begins anew.
   void reset() { running_ = Running{}; }
 
@@ -65,6 +69,7 @@ class Wheels {
   EncoderCalibration encoder_;
   ImuCalibration imu_;
   bool sees_ground_;
+  MountingWatch mounting_;
   Running running_;
 };
 

@@ -1,12 +1,11 @@
-#include "filter/health/mounting_watch.h"
+#include "filter/sources/wheels/mounting_watch.h"
 
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
 #include "filter/ekf/state.h"
-#include "filter/health/rotation_check.h"
-#include "filter/ingest/even_clock.h"
+#include "filter/ingest/evidence.h"
 #include "filter/ingest/silence.h"
 #include "filter/ingest/stream_clock.h"
 
