@@ -86,6 +86,7 @@ void make_recording(const SuiteRecording& recording, double rate_hz, double seco
 
 std::vector<std::string> suite_recordings() {
   std::vector<std::string> names;
+  names.reserve(kRecordings.size());
   for (const SuiteRecording& recording : kRecordings) names.emplace_back(recording.name);
   return names;
 }

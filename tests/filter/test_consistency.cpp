@@ -148,7 +148,7 @@ TEST_CASE("consistency: sensors that are right are suspected as often as the fal
       d[i].covariance = sigma.cwiseAbs2().asDiagonal();
     }
     alarms_of_three += check(d).disagree() ? 1 : 0;
-    d[draw % 3].available = false;
+    d[static_cast<std::size_t>(draw % 3)].available = false;
     alarms_of_two += check(d).disagree() ? 1 : 0;
   }
   const double spread = 4.0 * std::sqrt(kDraws * config.false_alarm);

@@ -209,7 +209,7 @@ Equations expected_equations(const std::vector<Feature>& features, const StereoP
     const double s = (seen.segment<2>(2) * a.z() - a.head<2>()).dot(slope) / slope.squaredNorm();
     if (s < 0.0) continue;
     bool fits = true;
-    for (int camera = 0; camera < (feature.has_right1 ? 2 : 1); ++camera) {
+    for (std::size_t camera = 0; camera < (feature.has_right1 ? 2U : 1U); ++camera) {
       const Eigen::Vector3d h = taken(problem.frame1[camera], ray, s);
       fits = fits && h.z() >= problem.least_depth;
       if (h.z() < problem.least_depth) continue;
@@ -218,7 +218,7 @@ Equations expected_equations(const std::vector<Feature>& features, const StereoP
       Eigen::Matrix<double, 3, 6> J_h;  // dh = [h]x theta - s tau
       J_h << 0.0, -h.z(), h.y(), -s, 0.0, 0.0, h.z(), 0.0, -h.x(), 0.0, -s, 0.0, -h.y(), h.x(), 0.0, 0.0, 0.0, -s;
       const Eigen::Matrix<double, 2, 6> H = J * J_h;
-      const Eigen::Vector2d r = seen.segment<2>(4 + 2 * camera) - h.head<2>() / h.z();
+      const Eigen::Vector2d r = seen.segment<2>(4 + 2 * static_cast<Eigen::Index>(camera)) - h.head<2>() / h.z();
       const double distance = r.norm() / problem.sigma;
       const double w = std::min(1.0, problem.huber / distance) / (problem.sigma * problem.sigma);
       fits = fits && distance < problem.fits;
@@ -241,7 +241,7 @@ TEST_CASE("kernels: a step of the motion between stereo images") {
   problem.huber = 2.0;
   problem.fits = 3.5;
   problem.least_depth = 1e-3;
-  for (const std::size_t count : {1, 3, 4, 5, 8, 150}) {
+  for (const std::size_t count : {1U, 3U, 4U, 5U, 8U, 150U}) {
     std::vector<Feature> features(count);
     for (Feature& f : features) {
       const Eigen::Vector3d p = Eigen::Vector3d(normal(rng), normal(rng), 4.0 + normal(rng)) * 0.5;
@@ -263,7 +263,7 @@ TEST_CASE("kernels: a step of the motion between stereo images") {
       std::array<StereoSums, 2> sums;
       Equations equations;
       equations.fitting = kernels.add_stereo(table, problem, sums.data());
-      for (int camera = 0; camera < 2; ++camera) {
+      for (std::size_t camera = 0; camera < 2; ++camera) {
         const double* entry = sums[camera].A;
         for (int j = 0; j < 6; ++j) {
           for (int i = j; i < 6; ++i) equations.A[camera](i, j) = equations.A[camera](j, i) = *entry++;
@@ -274,7 +274,7 @@ TEST_CASE("kernels: a step of the motion between stereo images") {
     });
     const Equations expected = expected_equations(features, problem);
     CHECK(found.fitting == expected.fitting);
-    for (int camera = 0; camera < 2; ++camera) {
+    for (std::size_t camera = 0; camera < 2; ++camera) {
       const double scale = expected.A[camera].norm() + 1.0;
       CHECK((found.A[camera] - expected.A[camera]).norm() < kClose * scale);
       CHECK((found.b[camera] - expected.b[camera]).norm() < kClose * scale);

@@ -87,8 +87,8 @@ class Vehicle {
     frame.t_ns = t_ns;
     frame.left = {pixels_.data(), kWidth, kHeight, kWidth};
     if (odd % 2 == 0) frame.right = frame.left;
-    if (odd == 255) frame.left.width = bytes_.take<std::int8_t>();
-    if (odd == 253) frame.right = {pixels_.data(), kWidth, kHeight, static_cast<int>(bytes_.take<std::int8_t>())};
+    if (odd == 255) frame.left.width = bytes_.take<std::uint8_t>() - 128;
+    if (odd == 253) frame.right = {pixels_.data(), kWidth, kHeight, bytes_.take<std::uint8_t>() - 128};
     if (const auto estimate = odometry_.add_stereo(frame)) fuzz::check(*estimate);
   }
 

@@ -174,7 +174,9 @@ TEST_CASE("calibration error: every quantity is drawn with its standard deviatio
     CAPTURE(factor);
     const Draws draws = differences(factor);
     CHECK(draws.size() == sigmas.size());
-    for (const auto& [name, sigma] : sigmas) {
+    for (const auto& stated : sigmas) {
+      const std::string& name = stated.first;
+      const double sigma = stated.second;
       CAPTURE(name);
       REQUIRE(draws.count(name) == 1);
       const Eigen::Map<const Eigen::ArrayXd> values(draws.at(name).data(),
