@@ -11,8 +11,8 @@
 namespace ear {
 namespace {
 
-constexpr double kHeldUp = 10.0;   // [s] chosen: no driver is held up so long; measured: 6 s
-constexpr double kSure = 3.0;      // chosen: standard deviations
+constexpr double kHeldUp = 10.0;  // [s] chosen: no driver is held up so long; measured: 6 s
+constexpr double kSure = 3.0;     // chosen: standard deviations
 
 TimeNs nanoseconds(double seconds) { return static_cast<TimeNs>(std::llround(1e9 * seconds)); }
 

@@ -64,8 +64,8 @@ void bind_health(py::module_& module) {
              Field{"score", &R::score});
   py::class_<Health> health(module, "Health", "What the estimator reports of itself; str() says it in words.");
   health.attr("_fields") =
-      py::make_tuple("status", "reason", "since_ns", "faulty", "onset_ns", "imprecise", "misaligned", "aiding", "quality",
-                     "horizontal_sigma", "vertical_sigma", "reset_counter", "load_step", "sources");
+      py::make_tuple("status", "reason", "since_ns", "faulty", "onset_ns", "imprecise", "misaligned", "aiding",
+                     "quality", "horizontal_sigma", "vertical_sigma", "reset_counter", "load_step", "sources");
   health.def_readonly("status", &Health::status)
       .def_readonly("reason", &Health::reason)
       .def_readonly("since_ns", &Health::since_ns)
