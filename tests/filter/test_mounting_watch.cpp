@@ -57,9 +57,12 @@ double contradicts_after(const Rig& rig, double duration, unsigned seed) {
     if (t == 0.0) continue;
     const double speed = speed_at(t - 0.5 * kStep) / (1.0 - rig.slip), turn = 0.5 * kTrack * yaw_rate(t - 0.5 * kStep);
     WheelIncrement increment{ns(t - kStep), ns(t), kStep / kRadius * Eigen::Vector2d(speed - turn, speed + turn)};
+    const double middle = t - 0.5 * kStep;
+    increment.angle.array() -= kStep * 2.0 * rig.rocking * std::cos(2.0 * middle);  // of the body about the axle
     increment.angle *= rig.rolled_over;
     if (rig.exchanged) increment.angle.reverseInPlace();
-    watch.add(increment, imu, Eigen::Vector3d::Zero());
+    const Eigen::Vector3d up(-rig.rocking * std::sin(2.0 * middle), rig.rocking * std::sin(3.0 * middle), 1.0);
+    watch.add(increment, imu, Eigen::Vector3d::Zero(), mounting * up);
     if (watch.contradicts() && first == INFINITY) first = t;
   }
   return first;
@@ -88,22 +91,22 @@ TEST_CASE("mounting: as stated, or nearly, is nothing to speak of, on rough grou
   }
 }
 
-TEST_CASE("mounting: axes that are exchanged or reversed show within half a minute") {
+TEST_CASE("mounting: axes that are exchanged or reversed show within a minute") {
   for (const double angle : {90.0, -90.0, 180.0, 120.0}) {
     CAPTURE(angle);
     Rig turned;
     turned.mounted = degrees(angle);
-    CHECK(contradicts_after(turned, 30.0, 1) < 30.0);
+    CHECK(contradicts_after(turned, 60.0, 1) < 60.0);
     turned.straight = true;
-    CHECK(contradicts_after(turned, 30.0, 1) < 30.0);
+    CHECK(contradicts_after(turned, 60.0, 1) < 60.0);
   }
   Rig backwards;
   backwards.rolled_over = -1.0;
-  CHECK(contradicts_after(backwards, 30.0, 2) < 30.0);
+  CHECK(contradicts_after(backwards, 60.0, 2) < 60.0);
   Rig mirrored;
   mirrored.yaw_sign = -1.0;
-  CHECK(contradicts_after(mirrored, 30.0, 3) < 30.0);
+  CHECK(contradicts_after(mirrored, 60.0, 3) < 60.0);
   Rig exchanged;
   exchanged.exchanged = true;
-  CHECK(contradicts_after(exchanged, 30.0, 4) < 30.0);
+  CHECK(contradicts_after(exchanged, 60.0, 4) < 60.0);
 }

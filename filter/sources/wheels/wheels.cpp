@@ -22,8 +22,8 @@ Wheels::Wheels(const OdometerConfig& config, const Calibration& calibration, boo
 
 void Wheels::update(const WheelIncrement& increment, const Context& context, Ekf& ekf, Records& records) {
   const State& x = ekf.state();
-  mounting_.add(increment, context.imu, x.imu.b_g);
   const BodyMotion motion = motion_at(middle_of(increment), x.imu, context.imu);
+  mounting_.add(increment, context.imu, x.imu.b_g, motion.R_WB.transpose() * Eigen::Vector3d::UnitZ());
   MeanRate rate = context.imu.mean_rate(increment.from_ns, increment.to_ns);
   rate.noise_factor *= context.gyro_noise;
   WheelRows rows = linearize_wheels(x, motion.R_WB, motion.v_W, increment, rate.gyro_B, config_.model, sees_ground_);
