@@ -18,6 +18,7 @@
 #include <stdexcept>
 
 #include "calibration/board_motion.h"
+#include "calibration/degree.h"
 #include "calibration/lens.h"
 #include "calibration/noise_estimate.h"
 #include "calibration/stated.h"
@@ -26,7 +27,6 @@
 namespace ear::calibration {
 namespace {
 
-constexpr double kDegree = 3.14159265358979323846 / 180.0;
 constexpr double kHuber = 2.0;        // [sigma]
 constexpr double kGate = 5.0;         // [sigma] further off is another corner
 constexpr double kBadView = 4.0;      // times the usual error

@@ -6,10 +6,11 @@
 #include <string>
 #include <utility>
 
+#include "calibration/degree.h"
+
 namespace ear::calibration {
 namespace {
 
-constexpr double kDegree = 3.14159265358979323846 / 180.0;
 constexpr int kColumns = 8;  // cells of the image
 constexpr int kRows = 6;
 constexpr double kCorner = 0.15;     // of the image's width and height: what counts as its corner

@@ -6,10 +6,10 @@
 #include "filter/ekf/so3.h"
 #include "filter/ekf/state.h"
 
+#include "calibration/degree.h"
+
 namespace ear::calibration {
 namespace {
-
-constexpr double kDegree = 3.14159265358979323846 / 180.0;
 
 Eigen::Vector3d vector(const double* values) { return Eigen::Map<const Eigen::Vector3d>(values); }
 

@@ -5,10 +5,10 @@
 #include <optional>
 #include <string>
 
+#include "calibration/degree.h"
+
 namespace ear::calibration {
 namespace {
-
-constexpr double kDegree = 3.14159265358979323846 / 180.0;
 
 double degrees(const std::vector<Finding>& findings, const std::string& name) {
   return kDegree * mean_sigma(findings, name).value_or(0.0);

@@ -12,6 +12,7 @@
 
 #include "calibration/allan.h"
 #include "calibration/calibrate.h"
+#include "calibration/degree.h"
 #include "calibration/wanted_motion.h"
 #include "src/log/log.h"
 #include "src/recording/calibration_files.h"
@@ -52,8 +53,6 @@ struct CalibrateArguments {
   std::string squares = "10x7";
   std::string lens;
 };
-
-constexpr double kDegree = 3.14159265358979323846 / 180.0;
 
 calibration::Drive read_drive(const fs::path& path, const CalibrateArguments& args, const Config& config,
                               std::optional<Calibration>& given, Progress& progress) {
@@ -169,7 +168,7 @@ void keep_body(const std::optional<Calibration>& known, Calibration& start) {
     for (std::size_t i = 0; i < start.cameras.size(); ++i) start.cameras[i].rate_hz = known->cameras[i].rate_hz;
   } else {
     start.cameras[0].T_BC.linear() << 0, 0, 1, -1, 0, 0, 0, -1, 0;  // looks ahead
-    start.cameras[0].pose_sigma = PoseSigma{10.0 * kDegree, 0.1};
+    start.cameras[0].pose_sigma = PoseSigma{10.0 * calibration::kDegree, 0.1};
   }
   if (start.cameras.size() > 1) start.cameras[1].T_BC = start.cameras[0].T_BC * T_C0C1;
 }

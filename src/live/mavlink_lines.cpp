@@ -10,10 +10,10 @@ namespace ear::live {
 namespace {
 
 Eigen::Matrix3d mounting(const MavlinkSettings& settings, const Calibration& calibration) {
-  constexpr double kDegree = M_PI / 180.0;
+  constexpr double kPerDegree = M_PI / 180.0;
   if (settings.mounting_deg) {
     const auto& [roll, pitch, yaw] = *settings.mounting_deg;
-    return mavlink::mounting_of(roll * kDegree, pitch * kDegree, yaw * kDegree);
+    return mavlink::mounting_of(roll * kPerDegree, pitch * kPerDegree, yaw * kPerDegree);
   }
   if (calibration.encoder) return mavlink::mounting_of(*calibration.encoder);
   throw InputError("mavlink: mounting_deg: how does the IMU sit in the vehicle? Without wheels nothing else says so");

@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
+
+#include "src/live/formatted.h"
 
 namespace ear::live {
 namespace {
@@ -25,13 +26,6 @@ constexpr double kLargestDelay = 0.01;  // [s] of the camera, against the calibr
 
 const char *const kStand = "stand", *const kLiftName = "lift", *const kPushName = "push", *const kTurnName = "turn",
                   *const kRollName = "roll", *const kDelay = "delay";
-
-template <typename... Values>
-std::string text(const char* format, Values... values) {
-  std::array<char, 240> line{};
-  std::snprintf(line.data(), line.size(), format, values...);
-  return line.data();
-}
 
 double angle_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return std::atan2(a.cross(b).norm(), a.dot(b));
@@ -126,8 +120,8 @@ void Preflight::add(const LiveFrame& frame, const Calibration& learned) {
   const double shown = learned.camera_time_offset - calibration_.camera_time_offset;
   if (seconds_between(frame.health.since_ns, frame.t_ns) < 10.0) return;
   set(kDelay, std::abs(shown) < kLargestDelay,
-      text("the images are %.1f ms %s than the calibration says", 1e3 * std::abs(shown),
-           shown < 0 ? "older" : "younger"));
+      formatted("the images are %.1f ms %s than the calibration says", 1e3 * std::abs(shown),
+                shown < 0 ? "older" : "younger"));
 }
 
 void Preflight::judge_rest(const Rest& rest) {
@@ -137,8 +131,8 @@ void Preflight::judge_rest(const Rest& rest) {
       calibration_.encoder ? Eigen::Vector3d(calibration_.encoder->T_BO.linear().col(2)) : rest.accel_B;
   const double tilt = angle_between(up_B, rest.accel_B);
   const bool is_gravity = std::abs(norm - kGravity) < kGravityTolerance;
-  std::string words = text("%.2f m/s^2, %.4f rad/s, up is %.0f degrees from where the calibration has it", norm,
-                           rest.gyro_B.norm(), tilt / kDegree);
+  std::string words = formatted("%.2f m/s^2, %.4f rad/s, up is %.0f degrees from where the calibration has it", norm,
+                                rest.gyro_B.norm(), tilt / kDegree);
   if (!is_gravity) words += ": this is not gravity: another unit, or a broken sensor";
   if (tilt > kUpright) words += ": the IMU's axes are not those of the calibration";
   set(kStand, is_gravity && tilt < kUpright && rest.gyro_B.norm() < kLargestBias, words);
@@ -155,12 +149,12 @@ void Preflight::judge(const Rest& from, const Rest& to) {
 void Preflight::judge_lift(const Rest& from, const Rest& to) {
   const double height = to.state->p_WB.z() - from.state->p_WB.z();
   if (std::abs(height) < kLift) return;
-  std::string words = text("by %.2f m, says the camera;", height);
+  std::string words = formatted("by %.2f m, says the camera;", height);
   bool right = true;
   for (std::size_t i = 0; i < calibration_.lasers->beams.size(); ++i) {
     const Eigen::Vector3d d_W = to.state->q_WB * calibration_.lasers->beams[i].d_B;
     const double longer = (to.range[i] - from.range[i]) * -d_W.z();
-    words += text(" beam %zu %.2f m", i, longer);
+    words += formatted(" beam %zu %.2f m", i, longer);
     right = right && about_one(longer / height);
   }
   if (!right) words += ": order, sign or scale of the beams, or the scale of the cameras, is wrong";
@@ -176,7 +170,7 @@ void Preflight::judge_push(const Rest& from, const Rest& to) {
   if (std::abs(path_O.x()) < kPush || Eigen::AngleAxisd(R_rest_).angle() > kStraight) return;
   const double left = (to.wheel[0] - from.wheel[0]) / path_O.x(), right = (to.wheel[1] - from.wheel[1]) / path_O.x();
   std::string words =
-      text("by %.2f m ahead, say the cameras; wheels %.2f and %.2f times that", path_O.x(), left, right);
+      formatted("by %.2f m ahead, say the cameras; wheels %.2f and %.2f times that", path_O.x(), left, right);
   const bool good = about_one(left) && about_one(right);
   if (left < 0.0 || right < 0.0)
     words += ": a wheel counts backward, or `forward` is wrong";
@@ -192,7 +186,7 @@ void Preflight::judge_turn(const Rest& from, const Rest& to) {
   if (std::abs(turn) < kTurn || std::abs(left) + std::abs(right) < 0.05) return;
   const double ratio = (right - left) / calibration_.encoder->track_width / turn;
   std::string words =
-      text("by %.0f degrees to the left, says the gyroscope; the wheels %.2f times that", turn / kDegree, ratio);
+      formatted("by %.0f degrees to the left, says the gyroscope; the wheels %.2f times that", turn / kDegree, ratio);
   if (ratio < 0.0)
     words += ": left and right are swapped, or the gyroscope's sign is wrong";
   else if (!about_one(ratio))
@@ -206,8 +200,8 @@ void Preflight::judge_roll(const Rest& from, const Rest& to) {
   const double error = angle_between(R_rest_.transpose() * from.accel_B, to.accel_B);
   const bool right = error < 2.0 * kTolerance * tilt;
   set(kRollName, right,
-      text("by %.0f degrees, says gravity; the gyroscope is %.0f degrees off%s", tilt / kDegree, error / kDegree,
-           right ? "" : ": an axis or the scale of one of the two is wrong"));
+      formatted("by %.0f degrees, says gravity; the gyroscope is %.0f degrees off%s", tilt / kDegree, error / kDegree,
+                right ? "" : ": an axis or the scale of one of the two is wrong"));
 }
 
 void Preflight::set(const std::string& name, bool right, const std::string& words) {

@@ -2,8 +2,9 @@
 
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <utility>
+
+#include "src/live/formatted.h"
 
 namespace ear::live {
 namespace {
@@ -17,13 +18,6 @@ constexpr double kFewest = 10.0;       // [Hz] above this part of the calibratio
 constexpr double kClockWords = 10.0;   // [s] in which a clock that is set again and again has words for
 constexpr int kMostClockWords = 3;     // so many times
 constexpr TimeNs kStep = 250'000'000;  // a clock that goes this far ahead of ours or falls behind has been set
-
-template <typename... Values>
-std::string text(const char* format, Values... values) {
-  std::array<char, 200> line{};
-  std::snprintf(line.data(), line.size(), format, values...);
-  return line.data();
-}
 
 }  // namespace
 
@@ -56,8 +50,8 @@ void StreamWatch::look_for_silence(TimeNs now_ns, std::vector<std::string>& word
   const bool slow_sensor = expected_hz_ > 0.0 && silence < 4.0 / expected_hz_;
   const bool silent = silence > kSilence && !slow_sensor;
   if (silent && !silent_) {
-    words.push_back(count_ == 0 ? text("%s: nothing has come yet", name_.c_str())
-                                : text("%s: silent for %.1f s", name_.c_str(), silence));
+    words.push_back(count_ == 0 ? formatted("%s: nothing has come yet", name_.c_str())
+                                : formatted("%s: silent for %.1f s", name_.c_str(), silence));
   }
   if (!silent && silent_) words.push_back(name_ + ": samples come");
   silent_ = silent;
@@ -79,11 +73,11 @@ void StreamWatch::look_at_rate(TimeNs now_ns, std::vector<std::string>& words) {
   const Rate rate = high ? Rate::high : low ? Rate::low : Rate::right;
   const bool back = said_ != Rate::right && std::abs(rate_hz_ - expected_hz_) < kNormal * expected_hz_;
   if (rate != Rate::right && rate != said_) {
-    words.push_back(text("%s: %.0f samples a second, where the calibration says %.0f%s", name_.c_str(), rate_hz_,
-                         expected_hz_, high ? ": what the queues cannot hold is refused" : ""));
+    words.push_back(formatted("%s: %.0f samples a second, where the calibration says %.0f%s", name_.c_str(), rate_hz_,
+                              expected_hz_, high ? ": what the queues cannot hold is refused" : ""));
     said_ = rate;
   } else if (back) {
-    words.push_back(text("%s: %.0f samples a second again", name_.c_str(), rate_hz_));
+    words.push_back(formatted("%s: %.0f samples a second again", name_.c_str(), rate_hz_));
     said_ = Rate::right;
   }
 }
@@ -94,10 +88,10 @@ void StreamWatch::look_at_clock(TimeNs now_ns, std::vector<std::string>& words) 
   if (seconds_between(clock_words_.since_ns, now_ns) > kClockWords) clock_words_ = {now_ns, 0};
   if (clock_words_.count >= kMostClockWords) return;  // held back: the next time says how many there were
   ++clock_words_.count;
-  words.push_back(text("%s: its clock was set by %+.3f s against this computer's", name_.c_str(),
-                       1e-9 * static_cast<double>(step_ns_.load())));
+  words.push_back(formatted("%s: its clock was set by %+.3f s against this computer's", name_.c_str(),
+                            1e-9 * static_cast<double>(step_ns_.load())));
   if (steps > seen_steps_ + 1)
-    words.back() += text(", and %.0f times before", static_cast<double>(steps - seen_steps_ - 1));
+    words.back() += formatted(", and %.0f times before", static_cast<double>(steps - seen_steps_ - 1));
   seen_steps_ = steps;
 }
 

@@ -139,8 +139,8 @@ EncoderCalibration read_encoder(const fs::path& file) {
 
 // Digits that were cut off are not a mistake; check_calibration() finds directions that are worse.
 Eigen::Vector3d without_rounding(const Eigen::Vector3d& direction) {
-  constexpr double kRounding = 1e-3;
-  return std::abs(direction.norm() - 1.0) < kRounding ? Eigen::Vector3d(direction.normalized()) : direction;
+  constexpr double kRotationRounding = 1e-3;
+  return std::abs(direction.norm() - 1.0) < kRotationRounding ? Eigen::Vector3d(direction.normalized()) : direction;
 }
 
 LaserCalibration read_lasers(const fs::path& file) {

@@ -11,13 +11,12 @@ namespace ear {
 namespace {
 
 constexpr double kRotationTolerance = 1e-6;  // readers have already repaired what is only rounded
-constexpr double kUnitTolerance = 1e-6;
-constexpr double kLeastBaseline = 1e-3;  // [m]
-constexpr double kMostBaseline = 5.0;    // [m]
-constexpr double kLeastFocal = 0.1;      // of the image's width: 157 degrees wide
-constexpr double kMostFocal = 20.0;      // of the image's width: 3 degrees wide
-constexpr double kMostLever = 10.0;      // [m] between two sensors of one vehicle
-constexpr double kMostTimeOffset = 0.5;  // [s]
+constexpr double kLeastBaseline = 1e-3;      // [m]
+constexpr double kMostBaseline = 5.0;        // [m]
+constexpr double kLeastFocal = 0.1;          // of the image's width: 157 degrees wide
+constexpr double kMostFocal = 20.0;          // of the image's width: 3 degrees wide
+constexpr double kMostLever = 10.0;          // [m] between two sensors of one vehicle
+constexpr double kMostTimeOffset = 0.5;      // [s]
 
 class Findings {
  public:
@@ -168,7 +167,7 @@ void check_encoder(const EncoderCalibration& encoder, Findings& findings) {
 void check_lasers(const LaserCalibration& lasers, Findings& findings) {
   for (const LaserBeam& beam : lasers.beams) {
     const double length = beam.d_B.norm();
-    if (!(std::abs(length - 1.0) < kUnitTolerance)) {
+    if (!(std::abs(length - 1.0) < kRotationTolerance)) {
       findings.error("laser0: beams." + beam.name + ".direction", "length " + Findings::text(length) + ", not 1");
     }
   }

@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string text(double value) {
+std::string exact_text(double value) {
   std::array<char, 32> buffer{};
   std::snprintf(buffer.data(), buffer.size(), "%.17g", value);
   return buffer.data();
@@ -25,7 +25,7 @@ std::string text(double value) {
 template <typename Values>
 std::string list(const Values& values) {
   std::string joined;
-  for (const double value : values) joined += (joined.empty() ? "" : ", ") + text(value);
+  for (const double value : values) joined += (joined.empty() ? "" : ", ") + exact_text(value);
   return "[" + joined + "]";
 }
 
@@ -35,24 +35,25 @@ std::string matrix(const Eigen::Isometry3d& pose) {
 }
 
 /// One sensor.yaml, key by key.
-class SensorFile {
+class OriginalSensorFile {
  public:
-  explicit SensorFile(const fs::path& folder) : file_((fs::create_directories(folder), folder / "sensor.yaml")) {}
-  SensorFile& line(const std::string& key, const std::string& value) {
+  explicit OriginalSensorFile(const fs::path& folder)
+      : file_((fs::create_directories(folder), folder / "sensor.yaml")) {}
+  OriginalSensorFile& line(const std::string& key, const std::string& value) {
     file_.write(key + ": " + value + "\n");
     return *this;
   }
-  SensorFile& number(const std::string& key, const std::optional<double>& value) {
-    return value ? line(key, text(*value)) : *this;
+  OriginalSensorFile& number(const std::string& key, const std::optional<double>& value) {
+    return value ? line(key, exact_text(*value)) : *this;
   }
-  SensorFile& sigma(const std::string& key, const std::optional<PoseSigma>& value) {
+  OriginalSensorFile& sigma(const std::string& key, const std::optional<PoseSigma>& value) {
     if (!value) return *this;
-    return line(key, "{rotation: " + text(value->rotation) + ", position: " + text(value->position) + "}");
+    return line(key, "{rotation: " + exact_text(value->rotation) + ", position: " + exact_text(value->position) + "}");
   }
-  SensorFile& sigma(const std::string& key, const std::optional<IntrinsicsSigma>& value) {
+  OriginalSensorFile& sigma(const std::string& key, const std::optional<IntrinsicsSigma>& value) {
     if (!value) return *this;
-    return line(key, "{focal_length: " + text(value->focal_length) +
-                         ", principal_point: " + text(value->principal_point) + "}");
+    return line(key, "{focal_length: " + exact_text(value->focal_length) +
+                         ", principal_point: " + exact_text(value->principal_point) + "}");
   }
 
  private:
@@ -63,7 +64,7 @@ void write_camera(const Calibration& calibration, std::size_t index, const fs::p
   const CameraCalibration& camera = calibration.cameras[index];
   const bool fisheye = camera.lens == LensModel::equidistant;
   const std::size_t coefficients = fisheye || camera.distortion[4] == 0.0 ? 4 : 5;
-  SensorFile file(folder / ("cam" + std::to_string(index)));
+  OriginalSensorFile file(folder / ("cam" + std::to_string(index)));
   file.line("sensor_type", "camera").line("T_BS", matrix(camera.T_BC)).number("rate_hz", camera.rate_hz);
   file.line("resolution", list(std::array<double, 2>{double(camera.width), double(camera.height)}));
   file.line("camera_model", "pinhole");
@@ -79,7 +80,7 @@ void write_camera(const Calibration& calibration, std::size_t index, const fs::p
 }
 
 void write_imu(const ImuCalibration& imu, const fs::path& folder) {
-  SensorFile file(folder / "imu0");
+  OriginalSensorFile file(folder / "imu0");
   file.line("sensor_type", "imu").line("T_BS", matrix(Eigen::Isometry3d::Identity())).number("rate_hz", imu.rate_hz);
   file.number("gyroscope_noise_density", imu.gyro_noise).number("gyroscope_random_walk", imu.gyro_random_walk);
   file.number("accelerometer_noise_density", imu.accel_noise);
@@ -88,7 +89,7 @@ void write_imu(const ImuCalibration& imu, const fs::path& folder) {
 }
 
 void write_encoder(const EncoderCalibration& encoder, const fs::path& folder) {
-  SensorFile file(folder / "encoder0");
+  OriginalSensorFile file(folder / "encoder0");
   file.line("sensor_type", "wheel_encoder").line("T_BS", matrix(encoder.T_BO)).number("rate_hz", encoder.rate_hz);
   file.line("resolution", std::to_string(encoder.resolution)).line("wraps", encoder.wraps ? "true" : "false");
   file.line("wheel_radius", list(encoder.wheel_radius)).number("wheel_separation", encoder.track_width);
@@ -102,7 +103,7 @@ void write_encoder(const EncoderCalibration& encoder, const fs::path& folder) {
 }
 
 void write_lasers(const LaserCalibration& lasers, const fs::path& folder) {
-  SensorFile file(folder / "laser0");
+  OriginalSensorFile file(folder / "laser0");
   file.line("sensor_type", "single_point_lasers").number("rate_hz", lasers.rate_hz).line("beams", "");
   for (const LaserBeam& beam : lasers.beams) {
     file.line("  - {name", beam.name + ", origin: " + list(beam.p_BL) + ", direction: " + list(beam.d_B) + "}");
@@ -140,7 +141,7 @@ class Csvs {
  private:
   static std::string numbers(const std::vector<double>& values) {
     std::string joined;
-    for (const double value : values) joined += (joined.empty() ? "" : ",") + text(value);
+    for (const double value : values) joined += (joined.empty() ? "" : ",") + exact_text(value);
     return joined;
   }
 

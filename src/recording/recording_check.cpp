@@ -16,7 +16,7 @@ constexpr double kLeastCoverage = 0.99;  // of a stream's time, by the IMU
 constexpr double kNoiseFactor = 3.0;     // measured against stated noise
 constexpr double kRepeatedShare = 0.01;  // of all IMU samples
 
-std::string text(double value) {
+std::string short_text(double value) {
   std::ostringstream stream;
   stream.precision(3);
   stream << value;
@@ -121,14 +121,15 @@ class Check {
     if (stream.covered_by_imu == 0.0) {
       report_.findings.push_back({Severity::error, stream.name, "at no time at which there are inertial samples"});
     } else if (stream.covered_by_imu < kLeastCoverage) {
-      warn(stream.name, "inertial samples during " + text(100.0 * stream.covered_by_imu) + " % of its time only");
+      warn(stream.name, "inertial samples during " + short_text(100.0 * stream.covered_by_imu) + " % of its time only");
     }
     if (timing.gaps > 0) {
-      warn(stream.name, std::to_string(timing.gaps) + " gaps, the longest " + text(timing.longest_gap) + " s");
+      warn(stream.name, std::to_string(timing.gaps) + " gaps, the longest " + short_text(timing.longest_gap) + " s");
     }
     const double off = std::abs(timing.rate_hz - stream.nominal_rate_hz);
     if (timing.count > 1 && stream.nominal_rate_hz > 0.0 && off > kRateTolerance * stream.nominal_rate_hz) {
-      warn(stream.name, text(timing.rate_hz) + " Hz, but its calibration says " + text(stream.nominal_rate_hz) + " Hz");
+      warn(stream.name,
+           short_text(timing.rate_hz) + " Hz, but its calibration says " + short_text(stream.nominal_rate_hz) + " Hz");
     }
   }
 
@@ -146,7 +147,7 @@ class Check {
 
   void judge_noise(const std::string& key, double measured, double stated) {
     if (measured <= kNoiseFactor * stated) return;
-    warn("imu0: " + key, "at rest it is " + text(measured) + ", but the calibration says " + text(stated));
+    warn("imu0: " + key, "at rest it is " + short_text(measured) + ", but the calibration says " + short_text(stated));
   }
 
   void warn(const std::string& where, const std::string& message) {

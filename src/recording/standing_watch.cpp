@@ -9,7 +9,7 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kLeastPath = 0.005;  // [m] by which a wheel turns at rest: springs, play of the gears
-constexpr double kNoiseFactor = 6.0;  // standard deviations of one reading
+constexpr double kMostSigmas = 6.0;   // standard deviations of one reading
 constexpr double kSlack = 0.1;        // [s] at both ends of a second: sensors do not begin together
 constexpr double kGap = 0.5;          // [s] without a reading: nobody saw what happened
 constexpr int kBlock = 16;            // [px] of an image
@@ -90,7 +90,7 @@ void StandingWatch::add(const EncoderSample& sample, const EncoderCalibration& w
   const auto turned = [&](std::int64_t now, std::int64_t before, double radius) {
     const double counts = distance(now, before, wheels);
     const double path = counts / static_cast<double>(wheels.resolution) * 2.0 * kPi * radius;
-    return counts > kNoiseFactor * wheels.noise_counts && !(path < kLeastPath);
+    return counts > kMostSigmas * wheels.noise_counts && !(path < kLeastPath);
   };
   const bool changed = !still_ || turned(sample.left_count, still_->left_count, wheels.wheel_radius[0]) ||
                        turned(sample.right_count, still_->right_count, wheels.wheel_radius[1]);

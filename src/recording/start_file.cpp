@@ -7,7 +7,7 @@
 namespace ear {
 namespace {
 
-constexpr double kUnitTolerance = 1e-3;  // of the length of a quaternion: digits that were cut off
+constexpr double kQuaternionTolerance = 1e-3;  // of the length of a quaternion: digits that were cut off
 
 double sigma_or_zero(const YamlMap& map, const std::string& key, double otherwise) {
   const auto sigma = map.get_or(key, otherwise);
@@ -32,7 +32,7 @@ GivenStart load_start(const std::filesystem::path& file, const TimeSpan& span) {
   x.p_WB = map.vector3("position");
   const std::vector<double> q = map.numbers("rotation", 4);
   x.q_WB = Eigen::Quaterniond(q[0], q[1], q[2], q[3]);
-  if (!(std::abs(x.q_WB.norm() - 1.0) < kUnitTolerance)) {
+  if (!(std::abs(x.q_WB.norm() - 1.0) < kQuaternionTolerance)) {
     throw map.error("rotation",
                     "a quaternion w, x, y, z of length one is needed, not " + std::to_string(x.q_WB.norm()));
   }

@@ -11,8 +11,8 @@
 namespace ear::ros2 {
 namespace {
 
-constexpr TimeNs kSameTime = 3'000'000;       // as for recordings: src/recording/frame_list.cpp
-constexpr std::size_t kMostWaiting = 8;       // images of one camera
+constexpr TimeNs kSameInstant = 3'000'000;    // as for recordings: src/recording/frame_list.cpp
+constexpr std::size_t kMostImages = 8;        // images of one camera
 constexpr std::uint32_t kMostPixels = 65536;  // along one side
 constexpr int kAsItIs = -1;
 
@@ -122,15 +122,15 @@ void StereoPairing::match(std::vector<RecordedFrame>& frames, Warnings& warnings
   auto& [left, right] = waiting_;
   while (!left.empty()) {
     const TimeNs t_ns = left.front().t_ns;
-    while (!right.empty() && right.front().t_ns < t_ns - kSameTime) {
+    while (!right.empty() && right.front().t_ns < t_ns - kSameInstant) {
       warnings.add("cam1: image without a left one", std::to_string(right.front().t_ns) + " ns");
       right.pop_front();
     }
     if (!stereo_) {
       emit(frames, {});
-    } else if (right.empty() && left.size() <= kMostWaiting) {
+    } else if (right.empty() && left.size() <= kMostImages) {
       return;
-    } else if (right.empty() || right.front().t_ns > t_ns + kSameTime) {
+    } else if (right.empty() || right.front().t_ns > t_ns + kSameInstant) {
       warnings.add("cam0: image without a right one", std::to_string(t_ns) + " ns");
       emit(frames, {});
     } else {
@@ -139,7 +139,7 @@ void StereoPairing::match(std::vector<RecordedFrame>& frames, Warnings& warnings
       emit(frames, partner);
     }
   }
-  while (right.size() > kMostWaiting) {
+  while (right.size() > kMostImages) {
     warnings.add("cam1: image without a left one", std::to_string(right.front().t_ns) + " ns");
     right.pop_front();
   }

@@ -6,7 +6,7 @@ namespace ear::ros2 {
 namespace {
 
 constexpr TimeNs kLongestGap = 100'000'000;  // between two accelerations to interpolate over
-constexpr std::size_t kMostWaiting = 4000;   // samples of either, 4 s at 1 kHz
+constexpr std::size_t kMostSamples = 4000;   // samples of either, 4 s at 1 kHz
 
 Eigen::Vector3d vector(const Vector3& v) { return {v.x, v.y, v.z}; }
 
@@ -37,7 +37,7 @@ void ImuMessages::pair(std::vector<ImuSample>& samples, Warnings& warnings) {
     while (accel_.size() > 1 && accel_[1].t_ns <= gyro.t_ns) accel_.pop_front();
     const ImuSample& before = accel_.front();
     const bool exact = before.t_ns == gyro.t_ns;
-    if (before.t_ns < gyro.t_ns && accel_.size() == 1 && gyro_.size() < kMostWaiting) return;  // the next is to come
+    if (before.t_ns < gyro.t_ns && accel_.size() == 1 && gyro_.size() < kMostSamples) return;  // the next is to come
     const bool enclosed = accel_.size() > 1 && before.t_ns < gyro.t_ns;
     if (exact) {
       samples.push_back({gyro.t_ns, gyro.gyro_B, before.accel_B});
@@ -49,8 +49,8 @@ void ImuMessages::pair(std::vector<ImuSample>& samples, Warnings& warnings) {
     }
     gyro_.pop_front();
   }
-  if (accel_.size() > kMostWaiting) accel_.pop_front();
-  if (gyro_.size() > kMostWaiting) {
+  if (accel_.size() > kMostSamples) accel_.pop_front();
+  if (gyro_.size() > kMostSamples) {
     warnings.add("imu0: no acceleration around a rate", topics_.gyro + ": " + std::to_string(gyro_.front().t_ns));
     gyro_.pop_front();
   }

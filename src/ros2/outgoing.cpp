@@ -6,8 +6,6 @@
 namespace ear::ros2 {
 namespace {
 
-constexpr double kTurn = 2.0 * M_PI;
-
 Vector3 message(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
 }  // namespace
@@ -22,7 +20,7 @@ Imu imu_message(const ImuSample& sample) {
 }
 
 JointState joint_message(const EncoderSample& sample, std::int64_t resolution) {
-  const double per_count = kTurn / static_cast<double>(resolution);
+  const double per_count = 2.0 * M_PI / static_cast<double>(resolution);
   JointState joints;
   joints.header = {time_of_stamp(sample.t_ns), "base_link"};
   joints.name = {"left", "right"};

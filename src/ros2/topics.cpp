@@ -39,12 +39,6 @@ std::string first_with(const std::vector<std::string>& names, std::initializer_l
   return found == names.end() ? std::string() : *found;
 }
 
-std::string joined(const std::vector<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
-  return text;
-}
-
 void guess_imu(SensorTopics& topics, const std::vector<Topic>& there, std::vector<std::string>& notes) {
   if (!topics.imu.empty() || !topics.gyro.empty() || !topics.accel.empty()) return;
   const std::vector<std::string> names = of_type(there, {kImu});
@@ -113,6 +107,12 @@ void guess_beams(SensorTopics& topics, const std::vector<Topic>& there, std::vec
 }
 
 }  // namespace
+
+std::string joined(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text;
+}
 
 std::size_t SensorTopics::beam_count() const {
   return static_cast<std::size_t>(

@@ -9,6 +9,9 @@
 
 namespace ear::ros2 {
 
+/// "a, b, c".
+[[nodiscard]] std::string joined(const std::vector<std::string>& names);
+
 /// What a topic is called and what it carries ("sensor_msgs/msg/Imu").
 struct Topic {
   std::string name;

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <string>
 
+#include "src/ros2/topics.h"
+
 namespace ear::ros2 {
 namespace {
 
@@ -26,12 +28,6 @@ std::size_t with_word(const std::vector<std::string>& names, const std::string& 
     found = std::min(found, i);
   }
   return found;
-}
-
-std::string joined(const std::vector<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
-  return text;
 }
 
 }  // namespace

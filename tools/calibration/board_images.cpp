@@ -23,8 +23,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kRate = 5.0;       // [Hz] of the images that are searched
-constexpr std::size_t kFewest = 6;  // corners
+constexpr double kRate = 5.0;              // [Hz] of the images that are searched
+constexpr std::size_t kFewestCorners = 6;  // corners
 constexpr double kOffBoard = 0.25;  // of a square: a corner that far from the plane's is another, or the board is
 constexpr double kWhole = 0.7;      // of the corners must lie on it
 constexpr double kFast = 150.0;     // [px/s] blurred
@@ -99,7 +99,7 @@ std::vector<SeenCorner> on_a_plane(const BoardShape& shape, const std::vector<Se
     if (fits[i] != 0) kept.push_back(corners[i]);
   }
   const bool whole = static_cast<double>(kept.size()) >= kWhole * static_cast<double>(corners.size());
-  return whole && kept.size() >= kFewest ? kept : std::vector<SeenCorner>{};
+  return whole && kept.size() >= kFewestCorners ? kept : std::vector<SeenCorner>{};
 }
 
 /// To fractions of a pixel. What aruco gives lies half a pixel to the lower right (4.6 counts from the pixel's border).
@@ -133,7 +133,7 @@ std::optional<double> moved_by(const BoardView& from, const BoardView& to) {
       }
     }
   }
-  if (count < kFewest) return std::nullopt;
+  if (count < kFewestCorners) return std::nullopt;
   return sum / static_cast<double>(count);
 }
 
@@ -216,11 +216,11 @@ std::vector<SeenCorner> BoardFinder::find(const cv::Mat& image) {
   std::vector<int> names;
   cv::aruco::interpolateCornersCharuco(markers, ids, image, board, points, names);
   for (std::size_t i = 0; i < points.size(); ++i) corners.push_back({names[i], {points[i].x, points[i].y}});
-  const bool enough = corners.size() >= kFewest;
+  const bool enough = corners.size() >= kFewestCorners;
   corners = enough ? on_a_plane(board_.shape, corners) : std::vector<SeenCorner>{};
   // Markers in plenty, and yet no corner between them: those of another board.
   refine(image, board_, corners);
-  if (corners.empty() && (enough || ids.size() >= kFewest)) ++misfits_;
+  if (corners.empty() && (enough || ids.size() >= kFewestCorners)) ++misfits_;
 #else
   static_cast<void>(image);
 #endif

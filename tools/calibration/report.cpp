@@ -16,11 +16,11 @@ namespace {
 using evaluation::Curve;
 using evaluation::Plot;
 
-constexpr double kWidth = 1040.0;    // [px] of a panel
-constexpr double kCell = 40.0;       // [px] of the image, over which residuals are averaged
-constexpr double kEnlarged = 40.0;   // how much longer than it is a mean residual is drawn
-constexpr std::size_t kFewest = 5;   // residuals in a cell
-constexpr std::size_t kHits = 1500;  // of a beam that are drawn
+constexpr double kWidth = 1040.0;            // [px] of a panel
+constexpr double kCell = 40.0;               // [px] of the image, over which residuals are averaged
+constexpr double kEnlarged = 40.0;           // how much longer than it is a mean residual is drawn
+constexpr std::size_t kFewestResiduals = 5;  // residuals in a cell
+constexpr std::size_t kHits = 1500;          // of a beam that are drawn
 const Eigen::Vector2d kInterruption(std::nan(""), std::nan(""));
 
 using Chosen = std::function<bool(const Residual&)>;
@@ -125,7 +125,7 @@ Curve mean_residuals(const std::vector<Residual>& residuals, std::size_t camera,
   }
   Curve curve{colour, "", {}, {}};
   for (const auto& [key, mean] : cells) {
-    if (mean.second < kFewest) continue;
+    if (mean.second < kFewestResiduals) continue;
     const Eigen::Vector2d middle((static_cast<double>(key.first) + 0.5) * kCell,
                                  -(static_cast<double>(key.second) + 0.5) * kCell);
     const Eigen::Vector2d error = kEnlarged / static_cast<double>(mean.second) * mean.first;

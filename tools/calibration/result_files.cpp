@@ -3,6 +3,7 @@
 #include <fstream>
 #include <vector>
 
+#include "calibration/degree.h"
 #include "calibration/stated.h"
 #include "src/recording/calibration_writer.h"
 #include "src/recording/input_error.h"
@@ -10,8 +11,6 @@
 
 namespace ear::calibration {
 namespace {
-
-constexpr double kDegree = 3.14159265358979323846 / 180.0;
 
 /// Of each beam, the mean of its axes.
 std::vector<BeamSigma> beam_sigmas(const Result& result) {

@@ -1,10 +1,8 @@
 #include "tools/calibration/simulated_drive.h"
 
-namespace ear::calibration {
-namespace {
-constexpr double kDegree = 3.14159265358979323846 / 180.0;
-}  // namespace
+#include "calibration/degree.h"
 
+namespace ear::calibration {
 Priors drawn_priors(double factor) {
   Priors priors{};
   priors.camera_rotation = factor * 0.2 * kDegree;

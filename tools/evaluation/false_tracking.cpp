@@ -18,7 +18,7 @@ constexpr TimeNs kShortest = 1'000'000'000;     // [ns] a shorter one may be the
 constexpr std::string_view kWord = "tracking";  // the health's first; the load step may follow
 
 /// One matched pose.
-struct Moment {
+struct Judgement {
   TimeNs t_ns = 0;
   int segment = 0;
   bool tracking = false;
@@ -39,53 +39,54 @@ double standard_deviations(const Eigen::Vector3d& e, const Eigen::Matrix3d& P) {
   return std::sqrt(std::max(0.0, e.dot(P.ldlt().solve(e))));
 }
 
-std::vector<Moment> judge(const Estimate& estimate, const Truth& truth, const Association& association,
-                          const std::vector<double>& distances) {
+std::vector<Judgement> judge(const Estimate& estimate, const Truth& truth, const Association& association,
+                             const std::vector<double>& distances) {
   const StartAlignment start = align_start(estimate, truth, association);
   const Eigen::Isometry3d T_ET = start.T_TE.inverse();
   // So that an error that may be the truth's own is never more than kMostSigmas of them.
   const Eigen::Matrix3d P_truth = std::pow(truth.error / kMostSigmas, 2) * Eigen::Matrix3d::Identity();
 
-  std::vector<Moment> moments;
-  moments.reserve(association.matches.size());
+  std::vector<Judgement> judgements;
+  judgements.reserve(association.matches.size());
   for (const Match& match : association.matches) {
     const Eigen::Vector3d& p_E = estimate.poses[match.index].p_WB;
     const Eigen::Vector3d e = T_ET * match.truth.p_WB - p_E;
-    Moment moment;
-    moment.t_ns = match.truth.t_ns;
-    moment.segment = match.segment;
-    moment.tracking = estimate.health[match.index].compare(0, kWord.size(), kWord) == 0;
-    moment.error = e.norm();
-    moment.travelled = distances[moments.size()] - distances.front();
+    Judgement judgement;
+    judgement.t_ns = match.truth.t_ns;
+    judgement.segment = match.segment;
+    judgement.tracking = estimate.health[match.index].compare(0, kWord.size(), kWord) == 0;
+    judgement.error = e.norm();
+    judgement.travelled = distances[judgements.size()] - distances.front();
     if (!estimate.covariance.empty()) {
       const PoseCovariance& P = estimate.covariance[match.index];
-      moment.sigmas = standard_deviations(e, P.topLeftCorner<3, 3>() + P_truth + covariance_of_yaw(start, p_E));
+      judgement.sigmas = standard_deviations(e, P.topLeftCorner<3, 3>() + P_truth + covariance_of_yaw(start, p_E));
     }
-    moment.far_off =
-        moment.error > std::max(truth.error, kMostOfLength * moment.travelled) || moment.sigmas > kMostSigmas;
-    moments.push_back(moment);
+    judgement.far_off =
+        judgement.error > std::max(truth.error, kMostOfLength * judgement.travelled) || judgement.sigmas > kMostSigmas;
+    judgements.push_back(judgement);
   }
-  return moments;
+  return judgements;
 }
 
-/// The moments from `first` to `last`, both included. What the health says holds until the next moment.
-FarOff stretch(const std::vector<Moment>& moments, std::size_t first, std::size_t last) {
-  FarOff result{moments[first].t_ns, moments[last].t_ns};
+/// The judgements from `first` to `last`, both included. What the health says holds until the next judgement.
+FarOff stretch(const std::vector<Judgement>& judgements, std::size_t first, std::size_t last) {
+  FarOff result{judgements[first].t_ns, judgements[last].t_ns};
   for (std::size_t i = first; i <= last; ++i) {
-    const Moment& moment = moments[i];
-    if (i < last && moment.tracking) result.tracking += seconds_between(moment.t_ns, moments[i + 1].t_ns);
-    result.most_sigmas = std::max(result.most_sigmas, moment.sigmas);
-    if (moment.error <= result.largest_error) continue;
-    result.largest_error = moment.error;
-    result.travelled = moment.travelled;
+    const Judgement& judgement = judgements[i];
+    if (i < last && judgement.tracking) result.tracking += seconds_between(judgement.t_ns, judgements[i + 1].t_ns);
+    result.most_sigmas = std::max(result.most_sigmas, judgement.sigmas);
+    if (judgement.error <= result.largest_error) continue;
+    result.largest_error = judgement.error;
+    result.travelled = judgement.travelled;
   }
   return result;
 }
 
-/// The last of the moments that are far off together with `first`.
-std::size_t end_of_stretch(const std::vector<Moment>& moments, std::size_t first) {
+/// The last of the judgements that are far off together with `first`.
+std::size_t end_of_stretch(const std::vector<Judgement>& judgements, std::size_t first) {
   std::size_t last = first;
-  while (last + 1 < moments.size() && moments[last + 1].far_off && moments[last + 1].segment == moments[first].segment)
+  while (last + 1 < judgements.size() && judgements[last + 1].far_off &&
+         judgements[last + 1].segment == judgements[first].segment)
     ++last;
   return last;
 }
@@ -125,17 +126,17 @@ StartAlignment align_start(const Estimate& estimate, const Truth& truth, const A
 
 FalseTracking false_tracking(const Estimate& estimate, const Truth& truth, const Association& association,
                              const std::vector<double>& distances) {
-  const std::vector<Moment> moments = judge(estimate, truth, association, distances);
+  const std::vector<Judgement> judgements = judge(estimate, truth, association, distances);
   FalseTracking result;
   const double known = known_time(truth.poses);
   if (known == 0.0) return result;
-  for (std::size_t first = 0; first < moments.size(); ++first) {
-    if (!moments[first].far_off) continue;
-    const std::size_t last = end_of_stretch(moments, first);
-    if (moments[last].t_ns - moments[first].t_ns >= kShortest) {
-      result.stretches.push_back(stretch(moments, first, last));
+  for (std::size_t first = 0; first < judgements.size(); ++first) {
+    if (!judgements[first].far_off) continue;
+    const std::size_t last = end_of_stretch(judgements, first);
+    if (judgements[last].t_ns - judgements[first].t_ns >= kShortest) {
+      result.stretches.push_back(stretch(judgements, first, last));
       result.share += result.stretches.back().tracking / known;
-      result.far_off += seconds_between(moments[first].t_ns, moments[last].t_ns) / known;
+      result.far_off += seconds_between(judgements[first].t_ns, judgements[last].t_ns) / known;
     }
     first = last;
   }

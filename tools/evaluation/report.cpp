@@ -16,7 +16,6 @@
 namespace ear::evaluation {
 namespace {
 
-constexpr double kDegPerRad = 57.29577951308232;
 constexpr double kWidth = 1040.0;      // [px] of a panel
 constexpr std::size_t kColours = 8;    // in the style sheet, of estimates and of strips
 constexpr double kBoundsInView = 4.0;  // a bound wider than this many times the error is cut off
@@ -28,14 +27,14 @@ const Eigen::Vector2d kInterruption(std::nan(""), std::nan(""));
 std::string colour(std::size_t entry) { return "e" + std::to_string(entry % kColours); }
 
 /// What to plot of one frame; `entry` gives access to its covariance.
-using Value = std::function<double(const ReportEntry&, const Frame&)>;
+using FrameValue = std::function<double(const ReportEntry&, const Frame&)>;
 
 double seconds_since_start(const Trajectory& truth, const Frame& frame) {
   return seconds_between(truth.front().t_ns, frame.match.truth.t_ns);
 }
 
 /// A curve over all frames of an entry, interrupted where the estimate or the truth has a gap.
-Curve curve_of(std::size_t index, const ReportEntry& entry, const Value& x, const Value& y) {
+Curve curve_of(std::size_t index, const ReportEntry& entry, const FrameValue& x, const FrameValue& y) {
   Curve curve{colour(index), entry.evaluation.name, {}};
   int segment = entry.evaluation.frames.front().match.segment;
   for (const Frame& frame : entry.evaluation.frames) {
@@ -85,13 +84,13 @@ double sigma(const ReportEntry& entry, const Frame& frame, int block, int axis, 
 
 /// One panel of errors over time with the bounds that the estimates give.
 Plot error_panel(const std::string& label, const Trajectory& truth, const std::vector<ReportEntry>& entries,
-                 const Range& time, const Value& error, const Value& deviation) {
+                 const Range& time, const FrameValue& error, const FrameValue& deviation) {
   Plot plot;
   plot.width = kWidth;
   plot.height = 150.0;
   plot.y_label = label;
   plot.x_range = time;
-  const Value x = [&](const ReportEntry&, const Frame& frame) { return seconds_since_start(truth, frame); };
+  const FrameValue x = [&](const ReportEntry&, const Frame& frame) { return seconds_since_start(truth, frame); };
   for (std::size_t i = 0; i < entries.size(); ++i) {
     Curve curve = curve_of(i, entries[i], x, error);
     if (!entries[i].estimate.covariance.empty())

@@ -10,8 +10,6 @@
 namespace ear::evaluation {
 namespace {
 
-constexpr double kDegPerRad = 57.29577951308232;
-
 using Json = nlohmann::ordered_json;
 using Getter = std::function<std::optional<double>(const Evaluation&)>;
 

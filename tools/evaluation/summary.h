@@ -9,6 +9,8 @@
 
 namespace ear::evaluation {
 
+inline constexpr double kDegPerRad = 57.29577951308232;
+
 /// "se3", "yaw" or "none".
 [[nodiscard]] std::string to_string(AlignmentKind kind);
 

@@ -8,8 +8,8 @@
 namespace ear::simulator {
 namespace {
 
-constexpr float kPixelTolerance = 0.01F;
-constexpr int kMostSteps = 1000;
+constexpr float kCastTolerance = 0.01F;
+constexpr int kMostSearchSteps = 1000;
 constexpr float kTiny = 1e-12F;
 
 struct SinCos {
@@ -37,7 +37,7 @@ Lanes horizontal_length(const RayLanes& rays) { return (rays.x * rays.x + rays.y
 GroundCaster::GroundCaster(const Terrain& terrain, const Eigen::Vector3d& eye_W, float focal, float farthest)
     : eye_W_(eye_W.cast<float>()),
       top_(static_cast<float>(terrain.bound())),
-      tolerance_(kPixelTolerance / focal),
+      tolerance_(kCastTolerance / focal),
       farthest_(farthest) {
   for (const GroundWave& wave : terrain.waves()) {
     const double phase = wave.wave_vector.dot(eye_W.head<2>()) + wave.phase;
@@ -77,7 +77,7 @@ GroundCaster::Hits GroundCaster::cast(const RayLanes& rays, const Lanes& from) c
   Lanes depth = from.min(limit);
   Ground ground{};
   Lanes gap;
-  for (int step = 0; step < kMostSteps; ++step) {
+  for (int step = 0; step < kMostSearchSteps; ++step) {
     ground = ground_below(rays, depth);
     gap = eye_W_.z() + depth * rays.z - ground.height;
     const Lanes open = (gap - tolerance_ * depth).min(limit - depth);  // positive: neither met nor lost

@@ -8,8 +8,8 @@
 namespace ear::simulator {
 namespace {
 
-constexpr double kNearest = 0.02;  // [m] in front of the camera
-constexpr double kWidest = 2.0;    // |x|, |y| of a ray: far outside the picture, where the polynomials mean nothing
+constexpr double kNearestDepth = 0.02;  // [m] in front of the camera
+constexpr double kWidest = 2.0;  // |x|, |y| of a ray: far outside the picture, where the polynomials mean nothing
 
 Eigen::Vector2d bend_radial_tangential(const std::array<double, 5>& k, const Eigen::Vector2d& p) {
   const double r2 = p.squaredNorm();
@@ -57,7 +57,7 @@ Eigen::Vector2d to_ray(const CameraCalibration& camera, const Eigen::Vector2d& p
 }
 
 std::optional<Eigen::Vector2d> project(const CameraCalibration& camera, const Eigen::Vector3d& p_C, double margin) {
-  if (p_C.z() < kNearest) return std::nullopt;
+  if (p_C.z() < kNearestDepth) return std::nullopt;
   const Eigen::Vector2d ray = p_C.head<2>() / p_C.z();
   if (ray.cwiseAbs().maxCoeff() > kWidest) return std::nullopt;
   const Eigen::Vector2d pixel = to_pixel(camera, ray);

@@ -18,12 +18,12 @@ constexpr std::array<Instant, 5> kInstants{
     {{-0.4, 0.2, -0.4}, {-0.2, -0.4, 0.0}, {0.0, 0.0, 0.4}, {0.2, 0.4, -0.2}, {0.4, -0.2, 0.2}}};
 
 // The panel at one instant as a camera sees it: the ray d = (x, y, 1) meets it at inverse depth m . d.
-struct View {
+struct SeenFrom {
   Eigen::Vector3d m, u, v;
   double a0, b0;
 };
 
-View view_of(const Panel& panel, const Eigen::Isometry3d& T_WC) {
+SeenFrom view_of(const Panel& panel, const Eigen::Isometry3d& T_WC) {
   const Eigen::Matrix3d R_CW = T_WC.linear().transpose();
   const Eigen::Vector3d eye_W = T_WC.translation();
   const double behind = panel.offset - panel.normal_W.dot(eye_W);  // negative in front of it
@@ -57,7 +57,7 @@ cv::Rect bounds(const Panel& panel, const Eigen::Isometry3d& T_WC, const CameraC
 void draw_moving_panel(const PanelMotion& panel_at, const Texture& texture, const CameraCalibration& camera,
                        const Trajectory& trajectory, double t, const Exposure& exposure, const cv::Mat& brightness,
                        cv::Mat& grey) {
-  std::array<View, kInstants.size()> views;
+  std::array<SeenFrom, kInstants.size()> views;
   for (std::size_t i = 0; i < kInstants.size(); ++i) {
     const double instant = t + kInstants[i].late * exposure.seconds;
     views[i] = view_of(panel_at(instant), camera_pose(trajectory.at(instant), camera.T_BC));
@@ -70,7 +70,7 @@ void draw_moving_panel(const PanelMotion& panel_at, const Texture& texture, cons
       double sum = 0.0;
       double share = 0.0;
       for (std::size_t i = 0; i < views.size(); ++i) {
-        const View& view = views[i];
+        const SeenFrom& view = views[i];
         const Eigen::Vector3d d(ray.x() + kInstants[i].right / camera.fu, ray.y() + kInstants[i].down / camera.fv, 1.0);
         const double inverse_depth = view.m.dot(d);
         if (inverse_depth <= 0.0) continue;

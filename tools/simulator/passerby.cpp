@@ -9,11 +9,11 @@
 namespace ear::simulator {
 namespace {
 
-constexpr double kWidth = 1.0;     // [m] two people side by side
-constexpr double kHeight = 1.8;    // [m]
-constexpr double kNearest = 0.6;   // [m] nobody comes nearer
-constexpr double kCrossing = 5.0;  // [s] from one side to the other
-constexpr double kHalfView = 0.9;  // tangent of half the angle that a camera sees, and some more
+constexpr double kPairWidth = 1.0;   // [m] two people side by side
+constexpr double kPairHeight = 1.8;  // [m]
+constexpr double kNearest = 0.6;     // [m] nobody comes nearer
+constexpr double kCrossing = 5.0;    // [s] from one side to the other
+constexpr double kHalfView = 0.9;    // tangent of half the angle that a camera sees, and some more
 
 Eigen::Vector3d heading_of(const Kinematics& motion) {
   const Eigen::Vector3d left_W = motion.R_WO.col(1);
@@ -49,11 +49,12 @@ Panel Passerby::panel(double t) const {
   const Eigen::Vector3d ahead_W = heading_of(motion);
   const Eigen::Vector3d left_W = Eigen::Vector3d::UnitZ().cross(ahead_W);
   const double crossings = std::max(1.0, std::round(fault_.duration / kCrossing));
-  const double outside = kHalfView * distance_ + 0.5 * kWidth;
+  const double outside = kHalfView * distance_ + 0.5 * kPairWidth;
   const double aside = outside * std::cos(kPi * crossings * (t - fault_.start) / fault_.duration);
   Eigen::Vector3d foot_W = motion.p_WB + distance_ * ahead_W + aside * left_W;
   foot_W.z() = terrain_.height(foot_W.x(), foot_W.y());
-  return {foot_W + 0.5 * kWidth * left_W, -left_W, Eigen::Vector3d::UnitZ(), kWidth, kHeight, Material::poster};
+  return {
+      foot_W + 0.5 * kPairWidth * left_W, -left_W, Eigen::Vector3d::UnitZ(), kPairWidth, kPairHeight, Material::poster};
 }
 
 bool hides(const Panel& passerby, const Eigen::Vector3d& eye_W, const Eigen::Vector3d& p_W) {

@@ -50,7 +50,7 @@ Panel flat_ground(const Scene& scene) {
 
 // Distance from the eye to the farthest corner of any panel [m]: no ground beyond is seen.
 float farthest_corner(const Scene& scene, const Eigen::Vector3d& eye_W) {
-  constexpr double kFarthest = 100.0;
+  constexpr double kFarthestHit = 100.0;
   double farthest = 0.0;
   for (const Panel& panel : scene.panels) {
     for (const double a : {0.0, panel.width}) {
@@ -59,7 +59,7 @@ float farthest_corner(const Scene& scene, const Eigen::Vector3d& eye_W) {
       }
     }
   }
-  return static_cast<float>(scene.panels.empty() ? kFarthest : std::min(farthest, kFarthest));
+  return static_cast<float>(scene.panels.empty() ? kFarthestHit : std::min(farthest, kFarthestHit));
 }
 
 }  // namespace

@@ -8,9 +8,9 @@
 namespace ear::simulator {
 namespace {
 
-constexpr double kLength = 12.0;  // [m] along x
-constexpr double kWidth = 9.0;    // along y
-constexpr double kHeight = 3.5;
+constexpr double kLength = 12.0;    // [m] along x
+constexpr double kRoomWidth = 9.0;  // along y
+constexpr double kRoomHeight = 3.5;
 constexpr double kBelow = 0.3;  // walls and furniture reach below a wavy ground
 
 struct Block {
@@ -55,7 +55,7 @@ void add_block(std::vector<Panel>& panels, const Block& block) {
   side(block.max_x, block.min_y, Eigen::Vector3d::UnitY(), y);   // faces +x
   side(block.max_x, block.max_y, -Eigen::Vector3d::UnitX(), x);  // faces +y
   side(block.min_x, block.max_y, -Eigen::Vector3d::UnitY(), y);  // faces -x
-  if (block.height < kHeight) {
+  if (block.height < kRoomHeight) {
     panels.push_back({{block.min_x, block.min_y, block.height},
                       Eigen::Vector3d::UnitX(),
                       Eigen::Vector3d::UnitY(),
@@ -78,17 +78,17 @@ void add_poster(std::vector<Panel>& panels, const Panel& wall, double along, dou
 Scene make_room(const Terrain& terrain) {
   Scene room;
   room.terrain = terrain;
-  room.size = {kLength, kWidth};
+  room.size = {kLength, kRoomWidth};
   const Eigen::Vector3d x = Eigen::Vector3d::UnitX();
   const Eigen::Vector3d y = Eigen::Vector3d::UnitY();
   const Eigen::Vector3d z = Eigen::Vector3d::UnitZ();
-  const double tall = kHeight + kBelow;
+  const double tall = kRoomHeight + kBelow;
   // Walls look inwards: u x v is the normal.
   const Panel south{{kLength, 0.0, -kBelow}, -x, z, kLength, tall, Material::wall};
-  const Panel north{{0.0, kWidth, -kBelow}, x, z, kLength, tall, Material::wall};
-  const Panel west{{0.0, 0.0, -kBelow}, y, z, kWidth, tall, Material::brick};
-  const Panel east{{kLength, kWidth, -kBelow}, -y, z, kWidth, tall, Material::wall};
-  const Panel ceiling{{0.0, kWidth, kHeight}, x, -y, kLength, kWidth, Material::ceiling};
+  const Panel north{{0.0, kRoomWidth, -kBelow}, x, z, kLength, tall, Material::wall};
+  const Panel west{{0.0, 0.0, -kBelow}, y, z, kRoomWidth, tall, Material::brick};
+  const Panel east{{kLength, kRoomWidth, -kBelow}, -y, z, kRoomWidth, tall, Material::wall};
+  const Panel ceiling{{0.0, kRoomWidth, kRoomHeight}, x, -y, kLength, kRoomWidth, Material::ceiling};
   room.panels = {south, north, west, east, ceiling};
 
   for (const Block& block : kBlocks) add_block(room.panels, block);

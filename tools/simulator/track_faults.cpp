@@ -16,7 +16,7 @@
 namespace ear::simulator {
 namespace {
 
-constexpr double kMargin = 3.0;               // [px] front ends keep away from the border
+constexpr double kBorder = 3.0;               // [px] front ends keep away from the border
 constexpr std::size_t kPointsOnPeople = 150;  // more than are in view at a time
 constexpr double kPatience = 0.25;            // [s] without a new image, after which no track can be taken up again
 constexpr double kSamePlace = 1e-9;           // [m]
@@ -80,7 +80,7 @@ void move_eyes(Eyes& eyes, const TrackFaults& setting, const std::vector<Eigen::
     for (const Seen& seen : eyes[c]) {
       const Eigen::Vector3d& p_W = points_W.at(seen.id - 1);
       const auto from = project(camera, clean_T_CW * p_W);
-      const auto to = project(camera, T_CW * p_W, kMargin);
+      const auto to = project(camera, T_CW * p_W, kBorder);
       if (from && to) moved.push_back({seen.id, shifted(camera, seen.ray, *from, *to)});
     }
     eyes[c] = std::move(moved);
@@ -113,7 +113,7 @@ class PeopleTracks {
         if (eyes[c].size() >= static_cast<std::size_t>(setting.options.max_features)) break;
         const Eigen::Vector3d p_W = panel.corner_W + places_[i].x() * panel.u_W + places_[i].y() * panel.v_W;
         const Eigen::Vector3d p_C = T_WC.inverse() * p_W;
-        if (!project(camera, p_C, kMargin)) continue;
+        if (!project(camera, p_C, kBorder)) continue;
         eyes[c].push_back({first_id_ + i, noisy(camera, p_C.hnormalized(), setting.options.sigma_px, rng_)});
       }
     }

@@ -11,10 +11,10 @@
 namespace ear::simulator {
 namespace {
 
-constexpr double kCell = 40.0;       // [px] one feature per cell is drawn before any cell gets its second
-constexpr double kMargin = 3.0;      // [px] front ends keep away from the border
-constexpr double kFarthest = 30;     // [m]
-constexpr double kMostVeiled = 0.3;  // what something before the lens dims more than this cannot be followed
+constexpr double kImageCell = 40.0;      // [px] one feature per cell is drawn before any cell gets its second
+constexpr double kImageBorder = 3.0;     // [px] front ends keep away from the border
+constexpr double kFarthestFeature = 30;  // [m]
+constexpr double kMostVeiled = 0.3;      // what something before the lens dims more than this cannot be followed
 
 struct Landmark {
   std::uint64_t id;
@@ -23,7 +23,7 @@ struct Landmark {
 };
 
 // One camera at one instant.
-struct View {
+struct CameraView {
   const Scene& scene;
   const CameraCalibration& camera;
   Eigen::Isometry3d T_WC;
@@ -33,9 +33,9 @@ struct View {
 };
 
 // Where a camera sees a point, if it does.
-std::optional<Eigen::Vector2d> see(const View& view, const Eigen::Vector3d& p_W) {
+std::optional<Eigen::Vector2d> see(const CameraView& view, const Eigen::Vector3d& p_W) {
   const Eigen::Vector3d p_C = view.T_WC.linear().transpose() * (p_W - view.T_WC.translation());
-  const auto pixel = project(view.camera, p_C, kMargin);
+  const auto pixel = project(view.camera, p_C, kImageBorder);
   if (!pixel || view.obstruction.veil(view.index, view.t, p_C.hnormalized()).opacity > kMostVeiled) {
     return std::nullopt;
   }
@@ -49,16 +49,16 @@ Eigen::Vector2d measure(const CameraCalibration& camera, const Eigen::Vector2d& 
 }
 
 // Fills empty cells of the grid, in random order, with points on whatever the camera sees there.
-void replenish(std::vector<Landmark>& landmarks, std::vector<Eigen::Vector3d>& points_W, const View& view,
+void replenish(std::vector<Landmark>& landmarks, std::vector<Eigen::Vector3d>& points_W, const CameraView& view,
                int max_features, Rng& rng) {
   const CameraCalibration& camera = view.camera;
   const Eigen::Isometry3d& T_WC = view.T_WC;
-  const int columns = static_cast<int>(std::ceil(camera.width / kCell));
-  const int rows = static_cast<int>(std::ceil(camera.height / kCell));
+  const int columns = static_cast<int>(std::ceil(camera.width / kImageCell));
+  const int rows = static_cast<int>(std::ceil(camera.height / kImageCell));
   std::vector<char> taken(static_cast<std::size_t>(columns * rows), 0);
   const auto cell_of = [&](const Eigen::Vector2d& pixel) {
-    return static_cast<std::size_t>(static_cast<int>(pixel.y() / kCell) * columns +
-                                    static_cast<int>(pixel.x() / kCell));
+    return static_cast<std::size_t>(static_cast<int>(pixel.y() / kImageCell) * columns +
+                                    static_cast<int>(pixel.x() / kImageCell));
   };
   for (const Landmark& landmark : landmarks) taken[cell_of(landmark.pixel)] = 1;
   std::vector<std::size_t> empty;
@@ -70,11 +70,11 @@ void replenish(std::vector<Landmark>& landmarks, std::vector<Eigen::Vector3d>& p
     if (landmarks.size() >= static_cast<std::size_t>(max_features)) return;
     const std::size_t column = cell % static_cast<std::size_t>(columns);
     const std::size_t row = cell / static_cast<std::size_t>(columns);
-    const double u = kCell * (static_cast<double>(column) + uniform(rng, 0.0, 1.0));
-    const double v = kCell * (static_cast<double>(row) + uniform(rng, 0.0, 1.0));
+    const double u = kImageCell * (static_cast<double>(column) + uniform(rng, 0.0, 1.0));
+    const double v = kImageCell * (static_cast<double>(row) + uniform(rng, 0.0, 1.0));
     const Eigen::Vector3d direction_W = T_WC.linear() * to_ray(camera, {u, v}).homogeneous().normalized();
     const auto hit = view.scene.cast(T_WC.translation(), direction_W);
-    if (!hit || hit->range > kFarthest) continue;
+    if (!hit || hit->range > kFarthestFeature) continue;
     const Eigen::Vector3d p_W = T_WC.translation() + hit->range * direction_W;
     const auto pixel = see(view, p_W);
     if (!pixel) continue;
@@ -95,7 +95,7 @@ Tracks generate_tracks(const Scene& scene, const Trajectory& trajectory, const s
   TimeNs previous_ns = stamps.empty() ? 0 : stamps.front();
   for (const TimeNs t_ns : stamps) {
     const Kinematics motion = trajectory.at(motion_time(t_ns));
-    const View left_view{scene, left, camera_pose(motion, left.T_BC), obstruction, 0, motion_time(t_ns)};
+    const CameraView left_view{scene, left, camera_pose(motion, left.T_BC), obstruction, 0, motion_time(t_ns)};
 
     const double loss = 1.0 - std::exp(-seconds_between(previous_ns, t_ns) / options.mean_life);
     previous_ns = t_ns;
@@ -114,7 +114,8 @@ Tracks generate_tracks(const Scene& scene, const Trajectory& trajectory, const s
       seen.id = landmark.id;
       seen.left = measure(left, landmark.pixel, options.sigma_px, rng);
       if (cameras.size() > 1) {
-        const View right_view{scene, cameras[1], camera_pose(motion, cameras[1].T_BC), obstruction, 1, left_view.t};
+        const CameraView right_view{scene,       cameras[1], camera_pose(motion, cameras[1].T_BC),
+                                    obstruction, 1,          left_view.t};
         if (const auto pixel = see(right_view, landmark.p_W)) {
           seen.right = measure(cameras[1], *pixel, options.sigma_px, rng);
           seen.has_right = true;

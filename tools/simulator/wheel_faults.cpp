@@ -3,12 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tools/simulator/constants.h"
+
 namespace ear::simulator {
 namespace {
 
-constexpr double kOnset = 0.1;     // [s] no wheel changes its speed at once
-constexpr double kCoasting = 2.0;  // [s] in which a lifted wheel loses its speed
-constexpr double kPeriod = 0.0025;
+constexpr double kOnset = 0.1;        // [s] no wheel changes its speed at once
+constexpr double kInterval = 0.0025;  // [s]
 
 using Pair = std::array<double, 2>;  // left and right
 
@@ -21,9 +22,9 @@ double presence(const Fault& fault, double t) {
 
 // Rates relative to the body in the clean motion [rad/s].
 Pair clean_rates(const WheelMotion& wheels, double t) {
-  const Pair before = wheels.angles(t - kPeriod);
-  const Pair after = wheels.angles(t + kPeriod);
-  return {(after[0] - before[0]) / (2.0 * kPeriod), (after[1] - before[1]) / (2.0 * kPeriod)};
+  const Pair before = wheels.angles(t - kInterval);
+  const Pair after = wheels.angles(t + kInterval);
+  return {(after[0] - before[0]) / (2.0 * kInterval), (after[1] - before[1]) / (2.0 * kInterval)};
 }
 
 bool on_ground(const MotionPlan& plan, double t) {
@@ -62,7 +63,7 @@ WheelFaults::WheelFaults(const std::vector<Fault>& faults, const MotionPlan& pla
                          const EncoderCalibration& axle) {
   for (const Fault& fault : faults) {
     if (!turns_wheels(fault.kind)) continue;
-    const int intervals = std::max(1, static_cast<int>(std::ceil(fault.duration / kPeriod)));
+    const int intervals = std::max(1, static_cast<int>(std::ceil(fault.duration / kInterval)));
     Excess excess{fault, fault.duration / intervals, {}};
     Knot knot;
     Pair before{};

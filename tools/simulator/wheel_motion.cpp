@@ -5,11 +5,12 @@
 #include <cmath>
 #include <cstddef>
 
+#include "tools/simulator/constants.h"
+
 namespace ear::simulator {
 namespace {
 
-constexpr double kCoasting = 2.0;  // [s]
-constexpr double kSpinUp = 0.02;   // [s]
+constexpr double kSpinUp = 0.02;  // [s]
 
 }  // namespace
 

@@ -26,9 +26,9 @@ void visit_numbers(R& r, F&& f) {
   f("worst_frame_ms", r.worst_frame_ms);
 }
 
-Json optional(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
+Json value_or_null(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
 
-std::optional<double> optional(const Json& json) {
+std::optional<double> number_or_none(const Json& json) {
   return json.is_null() ? std::nullopt : std::optional(json.get<double>());
 }
 
@@ -36,12 +36,12 @@ Result from_json(const Json& json) {
   Result result;
   result.estimated = json.at("estimated").get<bool>();
   visit_numbers(result, [&](const char* key, double& value) { value = json.at(key).get<double>(); });
-  result.nees_position = optional(json.at("nees_position"));
-  result.nees_orientation = optional(json.at("nees_orientation"));
+  result.nees_position = number_or_none(json.at("nees_position"));
+  result.nees_orientation = number_or_none(json.at("nees_orientation"));
   for (const Json& row : json.at("moments")) {
     const auto number = [&](std::size_t i) { return row.at(i).get<double>(); };
     result.moments.push_back({number(0), number(1), number(2), number(3), number(4), number(5), number(6), number(7),
-                              number(8), optional(row.at(9))});
+                              number(8), number_or_none(row.at(9))});
   }
   return result;
 }
@@ -51,12 +51,12 @@ Result from_json(const Json& json) {
 std::string to_json(const Result& result) {
   Json json{{"estimated", result.estimated}};
   visit_numbers(result, [&](const char* key, double value) { json[key] = value; });
-  json["nees_position"] = optional(result.nees_position);
-  json["nees_orientation"] = optional(result.nees_orientation);
+  json["nees_position"] = value_or_null(result.nees_position);
+  json["nees_orientation"] = value_or_null(result.nees_orientation);
   json["moments"] = Json::array();
   for (const Moment& m : result.moments) {
     json["moments"].push_back(
-        Json::array({m.t, m.distance, m.x, m.y, m.z, m.true_x, m.true_y, m.true_z, m.error, optional(m.nees)}));
+        Json::array({m.t, m.distance, m.x, m.y, m.z, m.true_x, m.true_y, m.true_z, m.error, value_or_null(m.nees)}));
   }
   return json.dump() + "\n";
 }
