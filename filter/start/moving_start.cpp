@@ -52,7 +52,7 @@ void MovingStart::add(TimeNs t_ns, const FeatureFrame& frame, const ImuBuffer& i
   TimedFrame next{t_ns, frame, StereoMotion{}};
   if (!first) {
     const TimedFrame& last = frames_.back();
-    const std::vector<StereoMatch>& matches = matches_.find(last.features, frame, {});
+    const std::vector<StereoMatch>& matches = matches_.find(last.features, frame, cameras);
     StereoMotion start;
     start.R_B0B1 = gyro_rotation(last.t_ns, t_ns, Eigen::Vector3d::Zero(), imu);
     const double dt = seconds_between(last.t_ns, t_ns);

@@ -59,7 +59,7 @@ Pair look(const Eigen::Matrix3d& R_B0B1, const Eigen::Vector3d& p_B0B1, double s
   return pair;
 }
 
-std::vector<StereoMatch> matched(const Pair& pair) { return StereoMatches().find(pair.from, pair.to, {}); }
+std::vector<StereoMatch> matched(const Pair& pair) { return StereoMatches().find(pair.from, pair.to, cameras()); }
 
 const Eigen::Vector3d kTurn(0.02, -0.01, 0.05);
 const Eigen::Vector3d kWay(0.15, -0.02, 0.03);
@@ -91,9 +91,22 @@ TEST_CASE("stereo motion: what is known of the lenses' errors is taken out of th
     }
   }
   StereoMatches matches;
-  const auto motion = stereo_motion(matches.find(pair.from, pair.to, lenses), cameras(), StereoMotion{}, kSigma);
+  CameraState known = cameras();
+  known.lens_error = lenses;
+  const auto motion = stereo_motion(matches.find(pair.from, pair.to, known), cameras(), StereoMotion{}, kSigma);
   REQUIRE(motion);
   CHECK((motion->p_B0B1 - kWay).norm() < 1e-9);
+}
+
+TEST_CASE("stereo motion: a right camera that is not where the calibration says is no turn of a vehicle that stands") {
+  Pair pair = look(Eigen::Matrix3d::Identity(), Eigen::Vector3d::Zero(), 0.0, 5);
+  for (FeatureFrame* const frame : {&pair.from, &pair.to}) {
+    for (FeatureObservation& feature : frame->features) feature.right += Eigen::Vector2d(0.002, 0.003);
+  }
+  const auto motion = stereo_motion(matched(pair), cameras(), StereoMotion{}, kSigma);
+  REQUIRE(motion);
+  CHECK(motion->p_B0B1.norm() < 1e-9);
+  CHECK(log_so3(motion->R_B0B1).norm() < 1e-9);
 }
 
 TEST_CASE("stereo motion: with noise the error is about what the covariance says") {

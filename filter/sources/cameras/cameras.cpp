@@ -45,7 +45,7 @@ void Cameras::measure_noise(const FeatureFrame& frame, const CameraState& camera
 Displacement Cameras::displacement(const FeatureFrame& frame, TimeNs t_ns, const ImuMotion& motion, const Ekf& ekf) {
   Displacement result;
   if (ekf.state().imu.t_ns == compared_.t_ns) {  // else the frame before was not where the state is
-    const std::vector<StereoMatch>& matches = matches_.find(compared_.before, frame, ekf.state().camera.lens_error);
+    const std::vector<StereoMatch>& matches = matches_.find(compared_.before, frame, ekf.state().camera);
     compared_.matched_ns = compared_.before.t_ns;
     StereoMotion start;
     start.R_B0B1 = motion.R_BiBj;
@@ -80,7 +80,7 @@ const std::vector<StereoMatch>& Cameras::matches_with(const FeatureFrame& frame,
   if (compared_.matched_ns == last_->t_ns) return matches_.found();
   compared_.matched_ns = last_->t_ns;
   compared_.seen.reset();
-  return matches_.find(last_features_, frame, cameras.lens_error);
+  return matches_.find(last_features_, frame, cameras);
 }
 
 bool Cameras::bridge(const FeatureFrame& frame, Ekf& ekf) {

@@ -125,8 +125,9 @@ StereoMatches::StereoMatches() {
 }
 
 const std::vector<StereoMatch>& StereoMatches::find(const FeatureFrame& from, const FeatureFrame& to,
-                                                    const std::array<LensError, 2>& lens_error) {
-  const auto& [left, right] = lens_error;
+                                                    const CameraState& cameras) {
+  const auto& [left, right] = cameras.lens_error;
+  const Eigen::Matrix3d R_C1C0 = cameras.T_C0C1.R.transpose();
   earlier_.clear();
   matches_.clear();
   for (const FeatureObservation& feature : from.features) {
@@ -138,8 +139,15 @@ const std::vector<StereoMatch>& StereoMatches::find(const FeatureFrame& from, co
     const auto found = std::lower_bound(earlier_.begin(), earlier_.end(), &now, by_id);
     if (found == earlier_.end() || (*found)->id != now.id) continue;
     const FeatureObservation& before = **found;
-    matches_.push_back({left.corrected(before.left), right.corrected(before.right), left.corrected(now.left),
-                        right.corrected(now.right), now.has_right});
+    StereoMatch match{left.corrected(before.left), right.corrected(before.right), left.corrected(now.left),
+                      right.corrected(now.right), now.has_right};
+    const double s = stereo_inverse_depth(cameras, match.left0, match.right0);
+    const Eigen::Vector3d h = R_C1C0 * (match.left0.homogeneous() - s * cameras.T_C0C1.p);
+    if (h.z() >= kLeastDepth) {
+      match.right1 -= match.right0 - h.hnormalized();
+      match.right0 = h.hnormalized();
+    }
+    matches_.push_back(match);
   }
   return matches_;
 }

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 #include <optional>
 #include <vector>
 
@@ -25,9 +24,10 @@ class StereoMatches {
  public:
   StereoMatches();
 
-  /// The features of both frames, what is known of the lenses' errors taken out; valid until the next call.
-  const std::vector<StereoMatch>& find(const FeatureFrame& from, const FeatureFrame& to,
-                                       const std::array<LensError, 2>& lens_error);
+  /// The features of both frames, what is known of the lenses' errors taken out, and of both right observations what
+  /// keeps the right one of frame 0 off its epipolar line: a right camera that is not quite where the calibration says
+  /// else looks like a turn from each frame to the next. Valid until the next call.
+  const std::vector<StereoMatch>& find(const FeatureFrame& from, const FeatureFrame& to, const CameraState& cameras);
   [[nodiscard]] const std::vector<StereoMatch>& found() const { return matches_; }
 
  private:

@@ -1,0 +1,32 @@
+// Sensors that are sound, with a calibration as wrong as real rigs have it, are not said to be at fault.
+#include <doctest/doctest.h>
+
+#include "tests/support/workload.h"
+#include "tools/experiments/figures.h"
+#include "tools/simulator/simulation.h"
+
+using namespace ear;
+
+// Before the right camera's error was taken out of the comparison of two frames, 14 of 20 such vehicles (seeds 1 to 20) had their
+// gyroscope or right camera at fault for as long as they stood: a constant misfit of the pair looked like a turn.
+TEST_CASE("sound sensors: a vehicle that stands, its propellers idling, is tracking") {
+  for (const std::uint64_t seed : test::workload<std::uint64_t>({1, 2, 4, 5, 6, 7, 11, 12, 13, 14, 982})) {
+    CAPTURE(seed);
+    simulator::Options options;
+    options.sequence = "static";
+    options.seed = seed;
+    options.duration = 15.0;
+    options.calibration_error = 1.0;
+    const simulator::Simulation simulation(options);
+    int tracking = 0, faulty = 0;
+    const auto count = [&](TimeNs, const Health& health) {
+      tracking += health.status == HealthStatus::tracking ? 1 : 0;
+      faulty += health.faulty.any() ? 1 : 0;
+    };
+    const experiments::Figures figures = experiments::measure(simulation, simulation.calibration(), FilterConfig{},
+                                                              evaluation::AlignmentKind::yaw, count);
+    CHECK(figures.ate_rmse.value_or(1.0) < 2e-3);
+    CHECK(tracking > 1000);
+    CHECK(faulty == 0);
+  }
+}
