@@ -7,8 +7,9 @@
 
 using namespace ear;
 
-// Before the right camera's error was taken out of the comparison of two frames, 14 of 20 such vehicles (seeds 1 to 20) had their
-// gyroscope or right camera at fault for as long as they stood: a constant misfit of the pair looked like a turn.
+// Before the right camera's error was taken out of the comparison of two frames, 14 of 20 such vehicles (seeds 1 to 20)
+// had their gyroscope or right camera at fault for as long as they stood: a constant misfit of the pair looked like a
+// turn.
 TEST_CASE("sound sensors: a vehicle that stands, its propellers idling, is tracking") {
   for (const std::uint64_t seed : test::workload<std::uint64_t>({1, 2, 4, 5, 6, 7, 11, 12, 13, 14, 982})) {
     CAPTURE(seed);
