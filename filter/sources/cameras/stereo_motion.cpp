@@ -54,6 +54,18 @@ StereoTable table_of(const std::vector<StereoMatch>& matches) {
           static_cast<int>(matches.size())};
 }
 
+/// The s with which h = a + s b is best seen at `right`.
+double inverse_depth(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector2d& right) {
+  double numerator = 0.0;
+  double denominator = 0.0;
+  for (int k = 0; k < 2; ++k) {
+    const double slope = b(k) - right(k) * b.z();
+    numerator += (right(k) * a.z() - a(k)) * slope;
+    denominator += slope * slope;
+  }
+  return denominator > 0.0 ? numerator / denominator : 0.0;
+}
+
 class Problem {
  public:
   Problem(const std::vector<StereoMatch>& matches, const CameraState& cameras, double sigma, Kernels kernels)
@@ -128,12 +140,13 @@ const std::vector<StereoMatch>& StereoMatches::find(const FeatureFrame& from, co
                                                     const CameraState& cameras) {
   const auto& [left, right] = cameras.lens_error;
   const Eigen::Matrix3d R_C1C0 = cameras.T_C0C1.R.transpose();
+  const Eigen::Vector3d b = -(R_C1C0 * cameras.T_C0C1.p);
   earlier_.clear();
   matches_.clear();
   for (const FeatureObservation& feature : from.features) {
     if (feature.has_right) earlier_.push_back(&feature);
   }
-  const auto by_id = [](const FeatureObservation* a, const FeatureObservation* b) { return a->id < b->id; };
+  const auto by_id = [](const FeatureObservation* f, const FeatureObservation* g) { return f->id < g->id; };
   std::sort(earlier_.begin(), earlier_.end(), by_id);
   for (const FeatureObservation& now : to.features) {
     const auto found = std::lower_bound(earlier_.begin(), earlier_.end(), &now, by_id);
@@ -141,11 +154,12 @@ const std::vector<StereoMatch>& StereoMatches::find(const FeatureFrame& from, co
     const FeatureObservation& before = **found;
     StereoMatch match{left.corrected(before.left), right.corrected(before.right), left.corrected(now.left),
                       right.corrected(now.right), now.has_right};
-    const double s = stereo_inverse_depth(cameras, match.left0, match.right0);
-    const Eigen::Vector3d h = R_C1C0 * (match.left0.homogeneous() - s * cameras.T_C0C1.p);
+    const Eigen::Vector3d a = R_C1C0 * match.left0.homogeneous();
+    const Eigen::Vector3d h = a + inverse_depth(a, b, match.right0) * b;
     if (h.z() >= kLeastDepth) {
-      match.right1 -= match.right0 - h.hnormalized();
-      match.right0 = h.hnormalized();
+      const Eigen::Vector2d fitting = h.hnormalized();
+      match.right1 -= match.right0 - fitting;
+      match.right0 = fitting;
     }
     matches_.push_back(match);
   }
@@ -154,16 +168,7 @@ const std::vector<StereoMatch>& StereoMatches::find(const FeatureFrame& from, co
 
 double stereo_inverse_depth(const CameraState& cameras, const Eigen::Vector2d& left, const Eigen::Vector2d& right) {
   const Eigen::Matrix3d R_C1C0 = cameras.T_C0C1.R.transpose();
-  const Eigen::Vector3d a = R_C1C0 * left.homogeneous();  // h = a + s b
-  const Eigen::Vector3d b = -(R_C1C0 * cameras.T_C0C1.p);
-  double numerator = 0.0;
-  double denominator = 0.0;
-  for (int k = 0; k < 2; ++k) {
-    const double slope = b(k) - right(k) * b.z();
-    numerator += (right(k) * a.z() - a(k)) * slope;
-    denominator += slope * slope;
-  }
-  return denominator > 0.0 ? numerator / denominator : 0.0;
+  return inverse_depth(R_C1C0 * left.homogeneous(), -(R_C1C0 * cameras.T_C0C1.p), right);
 }
 
 std::optional<StereoMotion> stereo_motion(const std::vector<StereoMatch>& matches, const CameraState& cameras,
