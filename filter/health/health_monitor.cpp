@@ -127,7 +127,7 @@ void HealthMonitor::add_frame(const Frame& frame, const std::array<SourceRecord,
   faults_[index_of(Source::gyroscope)].add(rotation_.differs(), t_ns);
   faults_[index_of(Source::accelerometer)].add(false, t_ns);
 
-  if (before.running && frame.running) life_.travelled += frame.speed * seconds_between(before.t_ns, t_ns);
+  if (usable() && before.running && frame.running) life_.travelled += frame.speed * seconds_between(before.t_ns, t_ns);
   health_.sources = records;
   health_.horizontal_sigma = frame.horizontal_sigma;
   health_.vertical_sigma = frame.vertical_sigma;

@@ -101,7 +101,7 @@ class HealthMonitor {
     TimeNs fitting_ns = 0;   ///< when something last did not contradict the state
     TimeNs unproven_ns = 0;  ///< while lost: when nothing carried the estimate, or the images contradicted it
     bool contradicted = false;
-    double travelled = 0.0;  ///< [m]
+    double travelled = 0.0;  ///< [m] while an estimate was given: what is lost may run anywhere
   };
 
   std::size_t beams_;
