@@ -153,13 +153,13 @@ bool CommonEstimator::check_image(const FeatureFrame& frame, const FrameAgreemen
   return health_.check_image(seen, imu_time(frame.t_ns, ekf_.state().camera), ingest_.imu().newest().t_ns);
 }
 
-std::optional<Estimate> CommonEstimator::make_estimate(bool ground_known, double scale_sigma) const {
+std::optional<Estimate> CommonEstimator::make_estimate(bool ground_known, const UnseenScales& scales) const {
   if (!ekf_.running()) return std::nullopt;
   const State& x = ekf_.state();
   const NavState here = nav_state(x.imu);
   Estimate estimate;
   estimate.state = alignment_.to_world(here);
-  estimate.covariance = alignment_.to_world(ekf_.ordinary_covariance(scale_sigma), here);
+  estimate.covariance = alignment_.to_world(ekf_.ordinary_covariance(scales), here);
   estimate.frame = records_.statistics;
   estimate.consistency = consistency_;
   if (ground_known) {

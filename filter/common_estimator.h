@@ -54,8 +54,8 @@ class CommonEstimator : public Estimator {
   [[nodiscard]] bool check_image(const FeatureFrame& frame, const FrameAgreement& seen);
 
   /// After the frame: the estimate, if there is a state. `ground_known`: the lasers have seen its normal.
-  /// `scale_sigma`: of all lengths, relative, where nothing measures them; else 0.
-  [[nodiscard]] std::optional<Estimate> make_estimate(bool ground_known, double scale_sigma) const;
+  /// `scales`: those that nothing measures.
+  [[nodiscard]] std::optional<Estimate> make_estimate(bool ground_known, const UnseenScales& scales) const;
   /// What the health monitor reads of it. `image`: false without one.
   [[nodiscard]] HealthMonitor::Frame health_frame(bool image, const FrameAgreement& seen,
                                                   const std::optional<Estimate>& estimate) const;

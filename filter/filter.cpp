@@ -64,8 +64,10 @@ void Filter::propagate_to(const FeatureFrame& frame) {
   }
 }
 
-/// A bias that jumped took the motion along until it was found out. Both are less well known by what was observed.
+/// A bias that jumped took the motion along until it was found out. Both are less well known by what was observed. By
+/// wheels alone it looks the same as a wheel that slips.
 void Filter::watch_biases() {
+  if (!sources_.cameras().show_motion(ekf_.state())) ekf_.discard_bias_changes();
   const TimeNs t_ns = ekf_.state().imu.t_ns;
   const BiasJump jump = bias_watch_.judge(ekf_.take_bias_changes(), t_ns);
   if (!jump.any()) return;
@@ -76,8 +78,10 @@ void Filter::watch_biases() {
 }
 
 std::optional<Estimate> Filter::report(bool image, const FrameAgreement& seen) {
-  const double scale_sigma = start_.scale_is_given() ? config_.prior.wheel_scale : 0.0;
-  const std::optional<Estimate> estimate = make_estimate(sources_.ground().known(), scale_sigma);
+  UnseenScales scales;
+  if (start_.scale_is_given()) scales.length = config_.prior.wheel_scale;
+  if (calibration_.cameras.empty()) scales.turn = config_.prior.gyro_scale;
+  const std::optional<Estimate> estimate = make_estimate(sources_.ground().known(), scales);
   const HealthMonitor::Frame frame = health_frame(image, seen, estimate);
   health_.add_frame(frame, records_.log.records());
   if (frame.running && !frame.possible) stop();

@@ -111,7 +111,7 @@ FrameAgreement Smoother::step(const FeatureFrame& frame, TimeNs t_ns, bool image
 }
 
 std::optional<Estimate> Smoother::report(bool image, const FrameAgreement& seen) {
-  const std::optional<Estimate> estimate = make_estimate(sources_.on_ground() && meter_.normal().known(), 0.0);
+  const std::optional<Estimate> estimate = make_estimate(sources_.on_ground() && meter_.normal().known(), {});
   HealthMonitor::Frame frame = health_frame(image, seen, estimate);
   if (estimate && last_good_ && health_.usable()) {
     frame.possible = frame.possible && explained(last_good_->state, estimate->state);

@@ -148,7 +148,8 @@ ear::Calibration calibration_of(const ear_calibration& from) {
                      from.accel_noise,
                      from.accel_random_walk,
                      sigma_of(from.gyro_bias_sigma),
-                     sigma_of(from.accel_bias_sigma)};
+                     sigma_of(from.accel_bias_sigma),
+                     sigma_of(from.gyro_scale_sigma)};
   calibration.camera_time_offset_sigma = sigma_of(from.camera_time_offset_sigma);
   if (from.has_encoder != 0) calibration.encoder = encoder_of(from);
   if (from.beam_count > 0) calibration.lasers = lasers_of(from);

@@ -28,6 +28,8 @@ Ekf::Ekf(const FilterConfig& config, const Calibration& calibration)
 void Ekf::start(const ImuState& x, const Eigen::VectorXd& sigma, bool scale_is_given) {
   running_ = true;
   state_.imu = x;
+  turned_ = 0.0;
+  turned_path_.setZero();
   covariance_.reset(sigma);
   correlate_baseline_and_lenses(sigma);
   const Eigen::RowVector2d apart(1.0 / wheel_apart_, -1.0 / wheel_apart_);
@@ -91,6 +93,8 @@ std::optional<TimeNs> Ekf::propagate(const ImuBuffer& samples, TimeNs t_ns, cons
         } else {
           total = step;
         }
+        turned_ += state_.imu.R_WB.row(2).dot(gyro_B - state_.imu.b_g) * dt;
+        turned_path_ += turned_ * dt * state_.imu.v_W;
         state_.imu = integrate(state_.imu, gyro_B, accel_B, dt);
         rate_B_ = gyro_B - state_.imu.b_g;
       });
@@ -177,8 +181,9 @@ bool Ekf::possible() const {
 }
 
 /// From the invariant error to the ordinary one: dv = nu - [v]x theta, dp = rho - [p]x theta. Larger wheels make
-/// distance and velocity longer alike.
-ImuErrorMatrix Ekf::ordinary_covariance(double scale_sigma) const {
+/// distance and velocity longer alike; a gyroscope that measures too much turns the vehicle the more the more it
+/// turned.
+ImuErrorMatrix Ekf::ordinary_covariance(const UnseenScales& scales) const {
   const ImuState& x = state_.imu;
   ImuErrorMatrix P = covariance_.matrix().topLeftCorner<err::imu_size, err::imu_size>();
   const auto subtract = [&P](int entry, const Eigen::Vector3d& by_rotation) {
@@ -188,11 +193,18 @@ ImuErrorMatrix Ekf::ordinary_covariance(double scale_sigma) const {
   };
   subtract(estimate_error::velocity, x.v_W);
   subtract(estimate_error::position, x.p_WB);
-  if (!(scale_sigma > 0.0)) return P;
-  Eigen::Matrix<double, err::imu_size, 1> J = Eigen::Matrix<double, err::imu_size, 1>::Zero();
-  J.segment<3>(estimate_error::velocity) = x.v_W;
-  J.segment<3>(estimate_error::position) = x.p_WB;
-  return P + scale_sigma * scale_sigma * J * J.transpose();
+  const auto add = [&P](double sigma, const Eigen::Vector3d& turn, const Eigen::Vector3d& v, const Eigen::Vector3d& p) {
+    if (!(sigma > 0.0)) return;
+    Eigen::Matrix<double, err::imu_size, 1> J = Eigen::Matrix<double, err::imu_size, 1>::Zero();
+    J.segment<3>(estimate_error::rotation) = sigma * turn;
+    J.segment<3>(estimate_error::velocity) = sigma * v;
+    J.segment<3>(estimate_error::position) = sigma * p;
+    P += J * J.transpose();
+  };
+  const Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
+  add(scales.length, Eigen::Vector3d::Zero(), x.v_W, x.p_WB);
+  add(scales.turn, turned_ * up, turned_ * up.cross(x.v_W), up.cross(turned_path_));
+  return P;
 }
 
 }  // namespace ear

@@ -33,6 +33,13 @@ struct GroundRows {
   int count = 0;
 };
 
+/// Standard deviations, relative, of scales that no sensor of the vehicle measures. They correct nothing, but count in
+/// the covariance of an estimate.
+struct UnseenScales {
+  double length = 0.0;  ///< of all lengths, by the wheels
+  double turn = 0.0;    ///< of the gyroscope, about the vertical
+};
+
 class Ekf {
  public:
   /// Usable settings and calibration: checked() in ekf/initial_state.h.
@@ -104,8 +111,8 @@ class Ekf {
   [[nodiscard]] const Eigen::Vector3d& rate_B() const { return rate_B_; }
   /// Are the state and its covariance numbers, and no variance negative?
   [[nodiscard]] bool possible() const;
-  /// Covariance of the ordinary errors (estimate_error), with the scale that nothing measures where `scale_sigma` > 0.
-  [[nodiscard]] ImuErrorMatrix ordinary_covariance(double scale_sigma) const;
+  /// Covariance of the ordinary errors (estimate_error), with what the scales that nothing measures do to them.
+  [[nodiscard]] ImuErrorMatrix ordinary_covariance(const UnseenScales& scales) const;
 
  private:
   void correlate_baseline_and_lenses(const Eigen::VectorXd& sigma);
@@ -121,6 +128,10 @@ class Ekf {
   Eigen::Vector3d rate_B_ = Eigen::Vector3d::Zero();
   std::uint64_t next_frame_ = 0;
   BiasChanges bias_changes_;
+  // Since the start: what one unit of the gyroscope's scale does to yaw [rad] and, turned by a right angle, to
+  // position.
+  double turned_ = 0.0;
+  Eigen::Vector3d turned_path_ = Eigen::Vector3d::Zero();  ///< integral of turned_ v dt [rad m]
 };
 
 }  // namespace ear

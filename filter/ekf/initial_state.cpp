@@ -37,6 +37,7 @@ void require_sigmas(const Calibration& calibration) {
   }
   require_sigma(calibration.imu.gyro_bias_sigma, "calibration: gyro_bias_sigma must be positive");
   require_sigma(calibration.imu.accel_bias_sigma, "calibration: accel_bias_sigma must be positive");
+  require_sigma(calibration.imu.gyro_scale_sigma, "calibration: gyro_scale_sigma must be positive");
   if (const auto& encoder = calibration.encoder) {
     require(encoder->stamp_sigma >= 0.0 && std::isfinite(encoder->stamp_sigma),
             "calibration: the encoder's stamp_sigma must not be negative");
@@ -121,6 +122,7 @@ FilterConfig settings_for(const FilterConfig& config, const Calibration& calibra
   };
   prior.gyro_bias = calibration.imu.gyro_bias_sigma.value_or(prior.gyro_bias);
   prior.accel_bias = calibration.imu.accel_bias_sigma.value_or(prior.accel_bias);
+  prior.gyro_scale = calibration.imu.gyro_scale_sigma.value_or(prior.gyro_scale);
   prior.time_offset = calibration.camera_time_offset_sigma.value_or(prior.time_offset);
   const std::vector<CameraCalibration>& cameras = calibration.cameras;
   if (!cameras.empty()) state_pose(cameras[0].pose_sigma, prior.camera_rotation, prior.camera_position);

@@ -103,6 +103,7 @@ void read_imu_noise(const YamlMap& map, ImuCalibration& imu) {
   imu.accel_random_walk = map.get<double>("accelerometer_random_walk");
   imu.gyro_bias_sigma = map.sigma("gyroscope_bias_sigma");
   imu.accel_bias_sigma = map.sigma("accelerometer_bias_sigma");
+  imu.gyro_scale_sigma = map.sigma("gyroscope_scale_sigma");
 }
 
 CameraCalibration read_camera(const fs::path& file, bool right) {

@@ -83,6 +83,7 @@ void write_imu(const ImuCalibration& imu, const fs::path& folder, const std::str
   file.value("accelerometer_random_walk", imu.accel_random_walk, "m/s^3/sqrt(Hz)");
   file.sigma("gyroscope_bias_sigma", imu.gyro_bias_sigma, "rad/s");
   file.sigma("accelerometer_bias_sigma", imu.accel_bias_sigma, "m/s^2");
+  file.sigma("gyroscope_scale_sigma", imu.gyro_scale_sigma, "relative");
   file.close();
 }
 

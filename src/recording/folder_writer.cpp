@@ -86,6 +86,7 @@ void write_imu(const ImuCalibration& imu, const fs::path& folder) {
   file.number("accelerometer_noise_density", imu.accel_noise);
   file.number("accelerometer_random_walk", imu.accel_random_walk);
   file.number("gyroscope_bias_sigma", imu.gyro_bias_sigma).number("accelerometer_bias_sigma", imu.accel_bias_sigma);
+  file.number("gyroscope_scale_sigma", imu.gyro_scale_sigma);
 }
 
 void write_encoder(const EncoderCalibration& encoder, const fs::path& folder) {

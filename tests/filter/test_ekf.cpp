@@ -175,9 +175,9 @@ TEST_CASE("ekf: inflated motion is about the body, inflated biases are each sens
   Ekf ekf = started();
   const Eigen::MatrixXd before = ekf.covariance().matrix();
   ekf.inflate_motion(0.2, 0.3, 0.4);
-  const ImuErrorMatrix ordinary = ekf.ordinary_covariance(0.0);
+  const ImuErrorMatrix ordinary = ekf.ordinary_covariance({});
   Ekf other = started();
-  const ImuErrorMatrix without = other.ordinary_covariance(0.0);
+  const ImuErrorMatrix without = other.ordinary_covariance({});
   const auto grown = (ordinary - without).diagonal();
   CHECK(grown.segment<3>(estimate_error::rotation).isApprox(Eigen::Vector3d::Constant(0.04), 1e-9));
   CHECK(grown.segment<3>(estimate_error::velocity).isApprox(Eigen::Vector3d::Constant(0.09), 1e-9));

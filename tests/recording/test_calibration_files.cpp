@@ -319,7 +319,7 @@ TEST_CASE("calibration: standard deviations beside the values") {
   append("cam1",
          "T_C0C1_sigma: {rotation: 0.0003, position: 0.00005}\n"
          "intrinsics_sigma: {focal_length: 0.4, principal_point: 0.2}\n");
-  append("imu0", "gyroscope_bias_sigma: 0.01\naccelerometer_bias_sigma: 0.2\n");
+  append("imu0", "gyroscope_bias_sigma: 0.01\naccelerometer_bias_sigma: 0.2\ngyroscope_scale_sigma: 0.01\n");
   append("encoder0",
          "T_BS_sigma: {rotation: 0.004, position: 0.003}\nwheel_radius_sigma: 0.0003\n"
          "wheel_radius_difference_sigma: 0.0001\nwheel_separation_sigma: 0.002\nstamp_sigma: 0.004\n");
@@ -337,6 +337,7 @@ TEST_CASE("calibration: standard deviations beside the values") {
   CHECK(c.camera_time_offset_sigma == 0.0005);
   CHECK(c.imu.gyro_bias_sigma == 0.01);
   CHECK(c.imu.accel_bias_sigma == 0.2);
+  CHECK(c.imu.gyro_scale_sigma == 0.01);
   REQUIRE(c.encoder->T_BO_sigma);
   CHECK(c.encoder->T_BO_sigma->rotation == 0.004);
   CHECK(c.encoder->wheel_radius_sigma == 0.0003);
@@ -416,6 +417,7 @@ TEST_CASE("calibration: what is written comes back, in the place of the recordin
   c.camera_time_offset_sigma = 1e-4;
   c.imu.gyro_noise = 0.002;
   c.imu.accel_bias_sigma = 0.3;
+  c.imu.gyro_scale_sigma = 0.004;
   c.encoder->wheel_radius = {0.0751, 0.0749};
   c.encoder->wheel_radius_sigma = 1e-5;
   c.encoder->wheel_radius_difference_sigma = 2e-5;
@@ -451,6 +453,7 @@ TEST_CASE("calibration: what is written comes back, in the place of the recordin
   CHECK(back.imu.gyro_noise == 0.002);
   CHECK(back.imu.accel_random_walk == c.imu.accel_random_walk);
   CHECK(back.imu.accel_bias_sigma == 0.3);
+  CHECK(back.imu.gyro_scale_sigma == 0.004);
   CHECK(back.encoder->T_BO.isApprox(c.encoder->T_BO, 1e-10));
   CHECK(back.encoder->T_BO_sigma->position == 2e-3);
   CHECK(back.encoder->wheel_radius == c.encoder->wheel_radius);
