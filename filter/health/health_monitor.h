@@ -77,6 +77,7 @@ class HealthMonitor {
  private:
   void judge_ground(const Frame& frame, const std::array<SourceRecord, kSourceCount>& records);
   void note_silence(TimeNs t_ns);
+  void hold_wheels(const FrameStatistics& before);
   void decide(TimeNs t_ns);
   [[nodiscard]] Reason reason(TimeNs t_ns) const;
   [[nodiscard]] bool wheels_carry(const FrameStatistics& frame) const;
@@ -91,6 +92,7 @@ class HealthMonitor {
     std::optional<TimeNs> imu_ns;
     std::optional<TimeNs> refused_imu_ns;  ///< the newest inertial one at the last refused frame
     TimeNs encoder_ns = 0, laser_ns = 0;   ///< newest inertial stamp when they came
+    TimeNs wheel_rows_ns = 0;              ///< of the last frame for which the wheels measured something
     double encoder_interval = 0.0;         ///< [s] between the last two
   };
   /// Since when the estimator is what it is.

@@ -414,3 +414,34 @@ TEST_CASE("health: without cameras too, the estimate is lost when nothing but in
   drive.imu_until(drive.t + 3.0);
   CHECK(drive.health().status == HealthStatus::lost);
 }
+
+TEST_CASE("health: wheels that are slower than the frames carry the estimate until they are silent") {
+  HealthMonitor monitor{[] {
+                          Calibration calibration;
+                          calibration.encoder.emplace();
+                          return calibration;
+                        }(),
+                        true, false};
+  HealthMonitor::Frame frame;
+  frame.image = false;
+  frame.running = true;
+  frame.statistics.on_ground = true;
+  Records records{};
+  const auto step = [&](double t, bool reading) {
+    monitor.add_imu({at(t), {0.0, 0.0, 1e-3 * t}, {0.0, 0.0, 9.8 + 1e-3 * t}}, 0.05);
+    if (reading) monitor.add_encoder(Verdict::accepted, at(t));
+    frame.t_ns = at(t);
+    frame.statistics.wheel_rows_used = reading ? 5 : 0;
+    for (const Source wheel : {Source::wheel_left, Source::wheel_right})
+      records[index_of(wheel)].used = reading ? 1 : 0;
+    monitor.add_frame(frame, records);
+  };
+  double t = 0.0;
+  for (int k = 0; k < 100; ++k, t += 0.04) {  // 25 frames and 8 readings a second
+    step(t, k % 3 == 0);
+    CAPTURE(k);
+    CHECK(monitor.health().aiding == Aiding::wheels);
+  }
+  for (int k = 0; k < 10; ++k, t += 0.04) step(t, false);
+  CHECK(monitor.health().aiding == Aiding::none);
+}
