@@ -13,8 +13,8 @@ class StampWatch {
  private:
   TimeNs last_imu_ns_ = 0;
   int count_ = 0;
-  double usual_ = 0.0;   ///< [s]
-  double spread_ = 0.0;  ///< [s] mean deviation from it
+  double usual_ = 0.0;     ///< [s]
+  double variance_ = 0.0;  ///< [s^2] of the distance from it
 };
 
 }  // namespace ear

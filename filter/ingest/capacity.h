@@ -7,7 +7,7 @@ namespace ear {
 
 /// Frames with up to so many features are processed without asking for memory. The first one with more takes it then.
 inline constexpr std::size_t kFeatureCapacity = 256;
-/// Chosen: readings of one stream that may wait; of inertial samples half as many, 0.25 s at 1 kHz.
-inline constexpr std::size_t kReadingCapacity = 512;
+/// Chosen: samples of one stream that are kept: 20 s at 200 Hz, 4 s at 1 kHz.
+inline constexpr std::size_t kCapacity = 4096;
 
 }  // namespace ear

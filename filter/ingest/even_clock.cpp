@@ -12,7 +12,6 @@ namespace ear {
 namespace {
 
 constexpr double kHeldUp = 10.0;  // [s] chosen: no driver is held up so long; measured: 6 s
-constexpr double kSure = 3.0;     // chosen: standard deviations
 
 TimeNs nanoseconds(double seconds) { return static_cast<TimeNs>(std::llround(1e9 * seconds)); }
 
@@ -24,7 +23,7 @@ bool EvenClock::is_even() const {
   if (r.xx <= 0.0) return false;
   const double slope = r.xy / r.xx;
   const double variance = (r.yy - slope * r.xy) / std::max(1.0, r.count - 1.0) / r.xx;
-  return slope + kSure * std::sqrt(std::max(0.0, variance)) < 0.5;
+  return slope + kClear * std::sqrt(std::max(0.0, variance)) < 0.5;
 }
 
 /// More than one where readings were lost: then the wheels turned by as much more.

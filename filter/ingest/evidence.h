@@ -3,8 +3,9 @@
 
 namespace ear {
 
-/// [s] chosen: of what a regression is made of, and of an interval, which a crystal keeps.
+/// [s] chosen: of what a regression is made of, of an interval, which a crystal keeps, and of how late stamps are.
 inline constexpr double kSlopeMemory = 100.0;
 inline constexpr double kClear = 4.0;  ///< chosen: so many standard deviations are not chance
+inline constexpr int kToKnow = 20;     ///< chosen: a mean of so many is known, whatever their rate
 
 }  // namespace ear

@@ -3,14 +3,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "filter/ingest/evidence.h"
+
 namespace ear {
 namespace {
 
-constexpr double kAccelShare = 0.1;    // chosen: of a deviation: bandwidth, scale and timing make that much of it wrong
-constexpr double kFull = 0.98;         // chosen: of the range or more is clipped
-constexpr double kFlat = 1e-6;         // chosen: relative: two extreme values as equal as this were cut off
-constexpr double kGyroMemory = 0.05;   // [s] chosen, see kRecently
-constexpr double kSpreadMemory = 2.5;  // chosen: times the memory of the mean
+constexpr double kAccelShare = 0.1;  // chosen: of a deviation: bandwidth, scale and timing make that much of it wrong
+constexpr double kFull = 0.98;       // chosen: of the range or more is clipped
+constexpr double kFlat = 1e-6;       // chosen: relative: two extreme values as equal as this were cut off
 
 }  // namespace
 
@@ -21,7 +21,7 @@ double ExcessWatch::add(const Eigen::Vector3d& value, double dt) {
   }
   const Eigen::Vector3d deviation = value - mean_;
   const double distance = deviation.norm();
-  const double ordinary = std::max(least_, kOrdinary * std::sqrt(variance_));
+  const double ordinary = std::max(least_, kClear * std::sqrt(variance_));
   const bool cut_off = clips_ = clipped(value);
   last_ = value;
 
@@ -33,7 +33,7 @@ double ExcessWatch::add(const Eigen::Vector3d& value, double dt) {
   const double counted = std::min(distance, ordinary);
   const double share = 1.0 - std::exp(-dt / memory_);
   if (distance > 0.0) mean_ += share * counted / distance * deviation;
-  if (!strikes) variance_ += (1.0 - std::exp(-dt / (kSpreadMemory * memory_))) * (counted * counted - variance_);
+  if (!strikes) variance_ += share * (counted * counted - variance_);
 
   // The errors of one strike have one sign. White noise adds up as they do if the k-th sample has 2 k - 1 times the
   // variance: n samples then have n^2 times that of one.
@@ -56,9 +56,10 @@ bool ExcessWatch::clipped(const Eigen::Vector3d& value) {
   return clip_level_ > 0.0 && largest > (1.0 - kFlat) * clip_level_;
 }
 
-/// No body turns so suddenly: all of a deviation of the rate may be wrong.
+/// No body turns so suddenly: all of a deviation of the rate may be wrong. The mean follows what bodies do to within
+/// that.
 ImpactGuard::ImpactGuard(const ImpactConfig& config, const ImuCalibration& imu)
-    : gyro_(config.gyro_range, config.gyro_deviation, kGyroMemory, 1.0),
+    : gyro_(config.gyro_range, config.gyro_deviation, config.gyro_deviation / kTurnRate, 1.0),
       accel_(config.accel_range, config.accel_deviation, kRecently, kAccelShare),
       gyro_sigma_(imu.gyro_noise * std::sqrt(imu.rate_hz)),
       accel_sigma_(imu.accel_noise * std::sqrt(imu.rate_hz)) {}

@@ -11,12 +11,11 @@
 namespace ear {
 namespace {
 
-constexpr int kVotes = 2;        // chosen: readings, for a verdict: one may have a false stamp
-constexpr double kReview = 5.0;  // [s] chosen: in which a verdict may be undone
+constexpr int kVotes = 2;  // chosen: readings, for a verdict: one may have a false stamp
 
 }  // namespace
 
-ImuClock::ImuClock() : samples_(kReadingCapacity) {}
+ImuClock::ImuClock() : samples_(kCapacity) {}
 
 bool ImuClock::jumps(double step) const { return interval_ > 0.0 && is_clock_jump(step - interval_); }
 
@@ -39,7 +38,7 @@ void ImuClock::follow(TimeNs driver_ns) {
   }
   last_ns_ = driver_ns;
   for (Other& other : others_) other.before_ns = other.newest_ns;
-  if (corrected_ns_ && seconds_between(*corrected_ns_, driver_ns) > kReview) corrected_ns_.reset();
+  if (corrected_ns_ && seconds_between(*corrected_ns_, driver_ns) > kLostAfter) corrected_ns_.reset();
 }
 
 void ImuClock::add(const ImuSample& sample) {
@@ -52,7 +51,7 @@ void ImuClock::add(const ImuSample& sample) {
     const double step = seconds_between(newest_waiting(), sample.t_ns);
     const bool follows = step > 0.0 && !jumps(step);
     const bool long_enough =
-        samples_.size() >= kReadingCapacity / 2 || static_cast<double>(samples_.size()) * interval_ > kStreamGap;
+        samples_.size() >= kCapacity / 2 || static_cast<double>(samples_.size()) * interval_ > kStreamGap;
     if (!follows || long_enough) settle(false);
   } else if (last_ns_) {
     const double step = seconds_between(*last_ns_, sample.t_ns);

@@ -3,14 +3,15 @@
 #include <algorithm>
 #include <cmath>
 
+#include "filter/ingest/evidence.h"
 #include "filter/ingest/impact_guard.h"
 
 namespace ear {
 namespace {
 
-constexpr double kTurnRate = 100.0;  // [rad/s^2] chosen: of a multirotor of 1.5 kg, 15 N on one side at 0.15 m
-constexpr double kReturned = 0.25;   // chosen: of the deviation, between the samples before and after a spike
-constexpr double kFlat = 0.125;      // chosen: of it, between the samples of one; half a sine over three differs by 0.4
+// Chosen: of the deviation, between the samples of a spike, and between those before and after it; half a sine over
+// three samples differs by 0.4.
+constexpr double kAlike = 0.25;
 
 }  // namespace
 
@@ -19,18 +20,18 @@ bool SpikeWatch::add(ImuBuffer& samples, double dt, bool no_strike, bool clips) 
   const Eigen::Vector3d before = samples.entry(length_ + 1).sample.*value_;
   const double step = (value - (length_ > 0 ? measured_[length_ - 1] : before)).norm();
   const bool may_be_strike = strikes_ && !no_strike;
-  const double spread = kOrdinary * std::sqrt(step_variance_);
+  const double spread = kClear * std::sqrt(step_variance_);
   const double limit = std::max(strikes_ && no_strike ? 0.0 : std::max(least_, least_rate_ * dt), spread);
   const double counted = std::min(step, limit);
   step_variance_ += (1.0 - std::exp(-dt / kRecently)) * (counted * counted - step_variance_);
 
   if (length_ > 0) {
     const double off = (measured_[length_ - 1] - before).norm();
-    if (step > limit && (value - before).norm() <= kReturned * off) {
+    if (step > limit && (value - before).norm() <= kAlike * off) {
       replace(samples, may_be_strike && length_ == 2);
       return true;
     }
-    const bool strike = may_be_strike && (clips || (value - measured_[0]).norm() > kFlat * off);
+    const bool strike = may_be_strike && (clips || (value - measured_[0]).norm() > kAlike * off);
     if (length_ == kLongest || strike) give_up(samples);
   }
   const bool begins = step > limit && samples.entry(1).noise.*factor_ == 1.0 && !(may_be_strike && clips);

@@ -4,13 +4,10 @@
 #include <utility>
 
 #include "filter/ingest/capacity.h"
+#include "filter/ingest/silence.h"
 
 namespace ear {
 namespace {
-
-constexpr std::size_t kImuCapacity = 4096;  // samples, chosen: 20 s at 200 Hz, 4 s at 1 kHz
-constexpr double kStartWindow = 2.0;        // [s] chosen: of readings kept for a start while rolling
-constexpr double kHeldSample = 0.04;        // [s] chosen: so far the newest inertial sample stands for the next one
 
 TimeNs begin_of(const WheelIncrement& increment) { return increment.from_ns; }
 TimeNs begin_of(const BeamRanges& ranges) { return ranges.t_ns; }
@@ -21,7 +18,7 @@ TimeNs end_of(const BeamRanges& ranges) { return ranges.t_ns; }
 template <typename T>
 std::optional<TimeNs> make_room(Ring<T>& readings, const T& next, bool has_state) {
   if (has_state) return readings.full() ? std::optional(end_of(readings.front())) : std::nullopt;
-  const auto too_old = [&] { return seconds_between(begin_of(readings.front()), end_of(next)) > kStartWindow; };
+  const auto too_old = [&] { return seconds_between(begin_of(readings.front()), end_of(next)) > kLostAfter; };
   while (!readings.empty() && (readings.full() || too_old())) readings.pop();
   return std::nullopt;
 }
@@ -34,9 +31,9 @@ Ingest::Ingest(const FilterConfig& config, const Calibration& calibration)
       guard_(calibration, config.max_imu_gap),
       impact_guard_(config.impact, calibration.imu),
       spikes_(config.impact, calibration.imu),
-      imu_(kImuCapacity),
-      increments_(kReadingCapacity),
-      ranges_(kReadingCapacity) {
+      imu_(kCapacity),
+      increments_(kCapacity),
+      ranges_(kCapacity) {
   if (calibration.encoder) encoder_.emplace(*calibration.encoder);
 }
 
@@ -84,7 +81,7 @@ Ingest::Encoders Ingest::take(EncoderSample sample, std::optional<TimeNs> state_
 }
 
 std::optional<TimeNs> Ingest::imu_due() const {
-  return imu_.size() == kImuCapacity ? std::optional(imu_[kImuCapacity / 2].t_ns) : std::nullopt;
+  return imu_.size() == kCapacity ? std::optional(imu_[kCapacity / 2].t_ns) : std::nullopt;
 }
 
 std::optional<TimeNs> Ingest::due_before(const WheelIncrement& increment, bool has_state) {
@@ -134,7 +131,7 @@ double Ingest::imu_interval() const {
 }
 
 bool Ingest::covers(TimeNs imu_time_ns) const {
-  return !imu_.empty() && seconds_between(imu_.newest().t_ns, imu_time_ns) < kHeldSample;
+  return !imu_.empty() && seconds_between(imu_.newest().t_ns, imu_time_ns) < config_.max_imu_gap;
 }
 
 InputCounts Ingest::counts() const {

@@ -2,22 +2,24 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "filter/ingest/capacity.h"
 #include "filter/ingest/silence.h"
+#include "filter/ingest/stream_clock.h"
 
 namespace ear {
 namespace {
 
-constexpr double kLargestRate = 100.0;    // [rad/s] data sheets: no gyroscope measures more
-constexpr double kLargestForce = 1000.0;  // [m/s^2] data sheets: the same of an accelerometer, 100 g
-constexpr double kLargestTurn = 500.0;    // [rad/s] chosen: of a wheel, 25 m/s with a radius of 5 cm
-constexpr double kStampJitter = 0.01;     // [s] chosen: by which a reading may have waited for its stamp
-constexpr double kLargestRange = 1000.0;  // [m] chosen: of a laser; more is a wrong unit
-constexpr double kWidestView = 100.0;     // chosen: tan of the angle off the axis, nothing is seen at 89.4 deg
-constexpr std::int64_t kLargestCount = std::int64_t{1} << 60;  // chosen: differences of counters must not overflow
-constexpr double kFarAhead = 0.5;  // [s] chosen: farther ahead of the inertial samples it is a false stamp
-constexpr double kTooLate = 0.1;   // [s] chosen: behind the state; a reading that comes later is not used
+/// The limits of the possible: no sound sensor delivers more.
+struct Limits {
+  double rate = 100.0;    ///< [rad/s] data sheets: of a gyroscope
+  double force = 1000.0;  ///< [m/s^2] data sheets: of an accelerometer, 100 g
+  double turn = 500.0;    ///< [rad/s] chosen: of a wheel, 25 m/s with a radius of 5 cm
+  double range = 1000.0;  ///< [m] chosen: of a laser; more is a wrong unit
+  double view = 100.0;    ///< chosen: tan of the angle off a camera's axis, nothing is seen at 89.4 deg
+};
+constexpr Limits kPossible = {};
 
 }  // namespace
 
@@ -34,32 +36,24 @@ ImuVerdict InputGuard::judge(const ImuSample& sample) {
     ++counts.not_finite;
     return verdict;
   }
-  if (!is_time(sample.t_ns) || sample.gyro_B.cwiseAbs().maxCoeff() > kLargestRate ||
-      sample.accel_B.cwiseAbs().maxCoeff() > kLargestForce) {
+  if (!is_time(sample.t_ns) || sample.gyro_B.cwiseAbs().maxCoeff() > kPossible.rate ||
+      sample.accel_B.cwiseAbs().maxCoeff() > kPossible.force) {
     ++counts.implausible;
     return verdict;
   }
+  const double step = imu_stamps_.newest() ? seconds_between(*imu_stamps_.newest(), sample.t_ns) : 0.0;
+  const double refused = imu_stamps_.refused();
   const Stamp stamp = imu_stamps_.judge(sample.t_ns);
   if (stamp == Stamp::not_later || stamp == Stamp::far_ahead) {
     ++(stamp == Stamp::not_later ? counts.not_later : counts.far_ahead);
-    if (stamp == Stamp::not_later) {
-      if (!refused_from_ns_) refused_from_ns_ = sample.t_ns;
-      refused_to_ns_ = sample.t_ns;
-    }
     return verdict;
   }
   ++counts.accepted;
-  const double step = imu_ns_ ? seconds_between(*imu_ns_, sample.t_ns) : 0.0;
-  if (step > max_imu_gap_) {
-    ++counts.gaps;
-    verdict.unseen = step;
-  }
-  if (refused_from_ns_) verdict.unseen = std::max(verdict.unseen, seconds_between(*refused_from_ns_, refused_to_ns_));
-  refused_from_ns_.reset();
+  if (step > max_imu_gap_) ++counts.gaps;
   verdict.accepted = true;
+  verdict.unseen = std::max(step > max_imu_gap_ ? step : 0.0, refused);
   verdict.begins_anew = stamp == Stamp::set_back || step > kLostAfter;
   if (stamp == Stamp::set_back) verdict.clock_shift = imu_stamps_.clock_shift();
-  imu_ns_ = sample.t_ns;
   return verdict;
 }
 
@@ -67,13 +61,15 @@ ImuVerdict InputGuard::judge(const ImuSample& sample) {
 /// far ahead of these, its own stamp was false, and it does not count.
 bool InputGuard::takes_stamp(TimeNs t_ns, std::optional<TimeNs> state_ns, std::optional<TimeNs>& last_ns,
                              StreamCounts& counts) const {
-  const auto far_ahead = [this](TimeNs stamp_ns) { return imu_ns_ && seconds_between(*imu_ns_, stamp_ns) > kFarAhead; };
+  const auto far_ahead = [newest_ns = imu_stamps_.newest()](TimeNs stamp_ns) {
+    return newest_ns && seconds_between(*newest_ns, stamp_ns) > kStale;
+  };
   if (last_ns && far_ahead(*last_ns)) last_ns.reset();
   if (far_ahead(t_ns)) {
     ++counts.far_ahead;
   } else if (last_ns && t_ns <= *last_ns) {
     ++counts.not_later;
-  } else if (state_ns && seconds_between(t_ns, *state_ns) > kTooLate) {
+  } else if (state_ns && seconds_between(t_ns, *state_ns) > kSilent) {
     ++counts.too_late;
   } else {
     if (last_ns && seconds_between(*last_ns, t_ns) > kStreamGap) ++counts.gaps;
@@ -85,18 +81,19 @@ bool InputGuard::takes_stamp(TimeNs t_ns, std::optional<TimeNs> state_ns, std::o
 
 Verdict InputGuard::judge(const EncoderSample& sample, std::optional<TimeNs> state_ns, EncoderReader& reader) {
   StreamCounts& counts = counts_.encoder;
-  const auto counter = [](std::int64_t n) { return n > -kLargestCount && n < kLargestCount; };
+  constexpr std::int64_t most = std::numeric_limits<std::int64_t>::max() / 2;  // differences must not overflow
+  const auto counter = [](std::int64_t n) { return n > -most && n < most; };
   if (!is_time(sample.t_ns) || !counter(sample.left_count) || !counter(sample.right_count)) {
     ++counts.implausible;
     return Verdict::impossible;
   }
   if (!takes_stamp(sample.t_ns, state_ns, last_encoder_ns_, counts)) return Verdict::mistimed;
-  if (reader.any()) {
-    const double dt = seconds_between(reader.last_ns(), sample.t_ns);
+  if (reader.last()) {
+    const double dt = seconds_between(reader.last()->t_ns, sample.t_ns);
     const bool gap = dt <= 0.0 || dt > kStreamGap;  // not later than a reading whose stamp was false
     if (gap) {
       reader.clear();
-    } else if (reader.largest_angle(sample) > kLargestTurn * (dt + kStampJitter)) {  // or the counter was set anew
+    } else if (reader.largest_angle(sample) > kPossible.turn * (dt + kClockJump)) {  // or the counter was set anew
       reader.clear();
       static_cast<void>(reader.add(sample));
       ++counts.implausible;
@@ -122,7 +119,7 @@ Verdict InputGuard::judge(const LaserSample& sample, std::optional<TimeNs> state
     return Verdict::impossible;
   }
   if (!is_time(sample.t_ns) || sample.range.size() != beam_count_ ||
-      any([](double range) { return range < 0.0 || range > kLargestRange; })) {
+      any([](double range) { return range < 0.0 || range > kPossible.range; })) {
     ++counts.implausible;
     return Verdict::impossible;
   }
@@ -133,7 +130,7 @@ Verdict InputGuard::judge(const LaserSample& sample, std::optional<TimeNs> state
 
 const FeatureFrame& InputGuard::plausible(const FeatureFrame& frame) {
   const auto visible = [](const Eigen::Vector2d& uv) {  // false for NaN
-    return std::abs(uv.x()) < kWidestView && std::abs(uv.y()) < kWidestView;
+    return std::abs(uv.x()) < kPossible.view && std::abs(uv.y()) < kPossible.view;
   };
   const auto possible = [&](const FeatureObservation& f) {
     return visible(f.left) && (!f.has_right || visible(f.right));
@@ -144,17 +141,14 @@ const FeatureFrame& InputGuard::plausible(const FeatureFrame& frame) {
   const bool twice = std::adjacent_find(ids_.begin(), ids_.end()) != ids_.end();
   if (!twice && std::all_of(frame.features.begin(), frame.features.end(), possible)) return frame;
 
-  plausible_frame_.t_ns = frame.t_ns;
-  plausible_frame_.right_skipped = frame.right_skipped;
-  plausible_frame_.features.clear();
-  const auto copies = [this](std::uint64_t id) {
-    const auto range = std::equal_range(ids_.begin(), ids_.end(), id);
-    return range.second - range.first;
+  plausible_frame_ = frame;
+  std::vector<FeatureObservation>& features = plausible_frame_.features;
+  const auto refused = [&](const FeatureObservation& f) {
+    const auto [first, end] = std::equal_range(ids_.begin(), ids_.end(), f.id);
+    return !possible(f) || end - first > 1;
   };
-  for (const FeatureObservation& feature : frame.features) {
-    if (possible(feature) && copies(feature.id) == 1) plausible_frame_.features.push_back(feature);
-  }
-  counts_.features_rejected += frame.features.size() - plausible_frame_.features.size();
+  features.erase(std::remove_if(features.begin(), features.end(), refused), features.end());
+  counts_.features_rejected += frame.features.size() - features.size();
   return plausible_frame_;
 }
 

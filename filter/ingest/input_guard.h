@@ -44,7 +44,7 @@ class InputGuard {
   /// A reading whose stamp jumped, before it is known why.
   Verdict refuse_encoder();
   /// Are the inertial samples refused, for stamps that are not later?
-  [[nodiscard]] bool refuses_imu() const { return refused_from_ns_.has_value(); }
+  [[nodiscard]] bool refuses_imu() const { return imu_stamps_.refuses(); }
 
   /// The filter begins anew: forgets the readings, but not the inertial clock nor the counts.
   void restart();
@@ -60,9 +60,6 @@ class InputGuard {
   std::size_t beam_count_;
   InputCounts counts_;
   StampGuard imu_stamps_;
-  std::optional<TimeNs> imu_ns_;           ///< the newest inertial sample accepted
-  std::optional<TimeNs> refused_from_ns_;  ///< since the newest, not later than it: stamps of the first
-  TimeNs refused_to_ns_ = 0;               ///< and the last
   std::optional<TimeNs> last_encoder_ns_;  ///< the newest reading accepted
   std::optional<TimeNs> last_laser_ns_;    ///< the same
   FeatureFrame plausible_frame_;

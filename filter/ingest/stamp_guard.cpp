@@ -10,9 +10,8 @@ constexpr double kSetBack = 1.0;  // [s] chosen: of stamps in a row before a clo
 }  // namespace
 
 Stamp StampGuard::judge(TimeNs t_ns) {
-  const double step = seconds_between(last_ns_, t_ns);
-  if (!any_ || (t_ns > last_ns_ && step <= kStreamGap)) {
-    any_ = true;
+  const bool ahead = !last_ns_ || t_ns > *last_ns_;
+  if (!last_ns_ || (ahead && seconds_between(*last_ns_, t_ns) <= kStreamGap)) {
     last_ns_ = t_ns;
     run_ = 0;
     return Stamp::next;
@@ -22,10 +21,9 @@ Stamp StampGuard::judge(TimeNs t_ns) {
   if (!follows) run_from_ns_ = t_ns;
   run_to_ns_ = t_ns;
 
-  const bool ahead = t_ns > last_ns_;
   const bool confirmed = ahead ? run_ >= kConfirmed : seconds_between(run_from_ns_, t_ns) >= kSetBack;
   if (!confirmed) return ahead ? Stamp::far_ahead : Stamp::not_later;
-  clock_shift_ = ahead ? 0 : run_from_ns_ - last_ns_;
+  clock_shift_ = ahead ? 0 : run_from_ns_ - *last_ns_;
   last_ns_ = t_ns;
   run_ = 0;
   return ahead ? Stamp::after_gap : Stamp::set_back;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 
 #include "ear/types.h"
 
@@ -25,10 +26,15 @@ class StampGuard {
 
   /// After set_back: what the earlier stamps are to be moved by to be stamps of the clock as it goes now [ns].
   [[nodiscard]] TimeNs clock_shift() const { return clock_shift_; }
+  /// The newest one accepted.
+  [[nodiscard]] std::optional<TimeNs> newest() const { return last_ns_; }
+  /// Is the last one refused for not being later?
+  [[nodiscard]] bool refuses() const { return run_ > 0 && run_to_ns_ <= *last_ns_; }
+  /// If so: how long stamps in a row went on meanwhile [s].
+  [[nodiscard]] double refused() const { return refuses() ? seconds_between(run_from_ns_, run_to_ns_) : 0.0; }
 
  private:
-  bool any_ = false;
-  TimeNs last_ns_ = 0;      ///< of those accepted
+  std::optional<TimeNs> last_ns_;
   TimeNs run_from_ns_ = 0;  ///< stamps in a row that follow each other, but not last_ns_: the first
   TimeNs run_to_ns_ = 0;    ///< and the last
   int run_ = 0;             ///< how many

@@ -6,16 +6,12 @@
 #include "filter/ingest/stamp_guard.h"
 
 namespace ear {
-namespace {
 
-constexpr double kPause = 5.0;  // chosen: intervals; after longer ones steps show nothing
-
-}  // namespace
-
-/// By how much a stamp is ahead of where readings that come at that time should be; 0 if that is no jump [s].
+/// By how much a stamp is ahead of where readings that come at that time should be; 0 if that is no jump [s]. After a
+/// pause steps show nothing.
 double StreamClock::jump_at(TimeNs t_ns, TimeNs now_ns, double tick) const {
   const double passed = seconds_between(*last_now_ns_, now_ns);
-  if (passed > kPause * interval_) return 0.0;
+  if (passed > longest_silence(interval_)) return 0.0;
   const double intervals = std::max(1.0, std::round(passed / interval_));
   const double jump = seconds_between(*last_ns_, t_ns) - intervals * interval_;
   const double ahead = seconds_between(now_ns, t_ns) - ahead_;

@@ -8,22 +8,21 @@
 #include <optional>
 
 #include "ear/types.h"
+#include "filter/ingest/evidence.h"
+#include "filter/ingest/silence.h"
 
 namespace ear {
 
-inline constexpr double kClockJump = 0.04;        ///< [s] chosen: either way; less may be a driver that was held up
-inline constexpr double kLargestClockJump = 5.0;  ///< [s] chosen: beyond that it is another clock
-inline constexpr double kJumpShare = 0.5;         ///< chosen: of a jump: readings that are off by less did not jump
-inline constexpr double kClockMemory = 2.0;       ///< [s] chosen: of how readings usually come
+inline constexpr double kClockJump = 0.04;   ///< [s] chosen: either way; less may be a driver that was held up
+inline constexpr double kJumpShare = 0.5;    ///< chosen: of a jump: readings that are off by less did not jump
+inline constexpr double kClockMemory = 2.0;  ///< [s] chosen: of how readings usually come
 /// Chosen: readings in a row, to put back what was taken out: so many do not all have false stamps, whatever their
 /// rate.
 inline constexpr int kContradictions = 8;
-inline constexpr int kToKnow = 20;  ///< chosen: until that is known: a mean of 20, whatever their rate
 
-/// Of any sensor. `off`: by how much a stamp is off the place where it should be [s].
-[[nodiscard]] inline bool is_clock_jump(double off) {
-  return std::abs(off) > kClockJump && std::abs(off) < kLargestClockJump;
-}
+/// Of any sensor. `off`: by how much a stamp is off the place where it should be [s]. If it is more than what a state
+/// outlasts, it is another clock.
+[[nodiscard]] inline bool is_clock_jump(double off) { return std::abs(off) > kClockJump && std::abs(off) < kLostAfter; }
 
 class StreamClock {
  public:

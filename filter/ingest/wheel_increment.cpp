@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace ear {
 
@@ -17,21 +18,16 @@ double EncoderReader::angle(std::int64_t from, std::int64_t to) const {
 }
 
 std::optional<WheelIncrement> EncoderReader::add(const EncoderSample& sample) {
-  const EncoderSample before = last_;
-  const bool first = !any_;
-  last_ = sample;
-  any_ = true;
-  if (first) return std::nullopt;
-  WheelIncrement turn;
-  turn.from_ns = before.t_ns;
-  turn.to_ns = sample.t_ns;
-  turn.angle = {angle(before.left_count, sample.left_count), angle(before.right_count, sample.right_count)};
-  return turn;
+  const std::optional<EncoderSample> before = std::exchange(last_, sample);
+  if (!before) return std::nullopt;
+  return WheelIncrement{before->t_ns,
+                        sample.t_ns,
+                        {angle(before->left_count, sample.left_count), angle(before->right_count, sample.right_count)}};
 }
 
 double EncoderReader::largest_angle(const EncoderSample& sample) const {
-  return std::max(std::abs(angle(last_.left_count, sample.left_count)),
-                  std::abs(angle(last_.right_count, sample.right_count)));
+  return std::max(std::abs(angle(last_->left_count, sample.left_count)),
+                  std::abs(angle(last_->right_count, sample.right_count)));
 }
 
 }  // namespace ear

@@ -9,6 +9,7 @@
 #include "ear/calibration.h"
 #include "ear/types.h"
 #include "filter/ingest/ring.h"
+#include "filter/ingest/silence.h"
 
 namespace ear {
 
@@ -46,17 +47,17 @@ using IncrementPart = WheelIncrement;
 
 /// Calls f(part) for the parts of the increments in [from_ns, to_ns], in time order, until one returns false. Readings
 /// do not come when frames do: an increment is shared out in proportion, the last one goes on as it was. False if f
-/// was, and where readings are missing: for longer than 50 ms and than the last increment.
+/// was, and where readings are missing.
 template <typename Function>
 bool for_each_part(const WheelIncrements& increments, TimeNs from_ns, TimeNs to_ns, const Function& f) {
-  constexpr TimeNs kMissedReading = 50'000'000;  // [ns] chosen
   TimeNs now_ns = from_ns;
   for (std::size_t i = 0; i < increments.size() && now_ns < to_ns; ++i) {
     const WheelIncrement& whole = increments[i];
     const bool last = i + 1 == increments.size();
     if (whole.to_ns <= now_ns && !last) continue;
-    const TimeNs missed = std::max(kMissedReading, whole.to_ns - whole.from_ns);
-    if (whole.from_ns > now_ns + kMissedReading || (last && to_ns > whole.to_ns + missed)) return false;
+    const double missing =
+        std::max(seconds_between(now_ns, whole.from_ns), last ? seconds_between(whole.to_ns, to_ns) : 0.0);
+    if (missing > longest_silence(whole.duration())) return false;
     const TimeNs end_ns = last ? to_ns : std::min(to_ns, whole.to_ns);
     const double share = seconds_between(now_ns, end_ns) / whole.duration();
     if (!f(IncrementPart{now_ns, end_ns, whole.angle * share})) return false;
@@ -77,16 +78,15 @@ class EncoderReader {
   /// How far the faster wheel turned since the reading before, which must be there [rad].
   [[nodiscard]] double largest_angle(const EncoderSample& sample) const;
 
-  [[nodiscard]] bool any() const { return any_; }
-  [[nodiscard]] TimeNs last_ns() const { return last_.t_ns; }
-  void clear() { any_ = false; }
+  /// The newest reading.
+  [[nodiscard]] const std::optional<EncoderSample>& last() const { return last_; }
+  void clear() { last_.reset(); }
 
  private:
   [[nodiscard]] double angle(std::int64_t from, std::int64_t to) const;
 
   EncoderCalibration calibration_;
-  EncoderSample last_;
-  bool any_ = false;
+  std::optional<EncoderSample> last_;
 };
 
 }  // namespace ear

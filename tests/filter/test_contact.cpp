@@ -18,7 +18,7 @@ constexpr double kGravity = 9.81;
 /// A vehicle over a floor, step by step of 5 ms, and what the detector makes of it.
 class Drive {
  public:
-  explicit Drive(const ContactConfig& config = {}) : detector(config, calibration) {}
+  explicit Drive(const FilterConfig& config = {}) : detector(config, calibration) {}
 
   // What the next steps do.
   double climb = 0.0;                             ///< [m/s]
@@ -249,10 +249,10 @@ TEST_CASE("contact: no beam sees anything, and the mode stays, on the ground and
 TEST_CASE("contact: a car without lasers is on the ground; without wheels nobody knows") {
   Calibration car = vehicle_with_beams();
   car.lasers.reset();
-  CHECK(ContactDetector(ContactConfig{}, car).mode() == ContactMode::ground);
+  CHECK(ContactDetector(FilterConfig{}, car).mode() == ContactMode::ground);
   Calibration drone = vehicle_with_beams();
   drone.encoder.reset();
-  ContactDetector detector(ContactConfig{}, drone);
+  ContactDetector detector(FilterConfig{}, drone);
   CHECK(detector.add_laser({1, {0.1, 0.1, 0.1}}) == ContactEvent::none);
   CHECK(detector.add_imu({2, Eigen::Vector3d::Zero(), Eigen::Vector3d(0.0, 0.0, 50.0)}) == ContactEvent::none);
   CHECK(detector.add_wheels({2, 3, {0.1, 0.1}}) == ContactEvent::none);

@@ -36,7 +36,7 @@ class Flight {
   }
 
   Calibration calibration = vehicle_with_beams();
-  GroundTracker tracker{*calibration.lasers, *calibration.encoder};
+  GroundTracker tracker{*calibration.lasers, *calibration.encoder, OdometerConfig{}};
   VehiclePose pose;
 
  private:

@@ -72,7 +72,7 @@ struct ContactTruth {
     TimeNs t_ns;
   };
   std::vector<Event> events;
-  ContactDetector detector(ContactConfig{}, simulation.calibration());
+  ContactDetector detector(FilterConfig{}, simulation.calibration());
   EncoderReader reader(*simulation.calibration().encoder);
   std::size_t imu = 0, encoder = 0, laser = 0;
   const auto next = [](const auto& samples, std::size_t i) { return i < samples.size() ? samples[i].t_ns : kEnd; };

@@ -6,7 +6,6 @@
 #include <Eigen/Core>
 #include <bitset>
 #include <cstdint>
-#include <limits>
 #include <optional>
 
 #include "ear/calibration.h"
@@ -24,12 +23,15 @@ enum class ContactMode : std::uint8_t {
   air
 };
 
+/// [s] chosen: so long after a touchdown its strike may come, and the wheels do not roll yet.
+inline constexpr double kLanding = 0.1;
+
 enum class ContactEvent : std::uint8_t { none, touchdown, takeoff };
 
 /// Samples of all sensors in time order. A vehicle with wheels and without lasers is always on the ground.
 class ContactDetector {
  public:
-  ContactDetector(const ContactConfig& config, const Calibration& calibration);
+  ContactDetector(const FilterConfig& config, const Calibration& calibration);
 
   /// Each returns whether the mode has just changed. The first mode after `unknown` is no event.
   ContactEvent add_imu(const ImuSample& sample);
@@ -41,23 +43,19 @@ class ContactDetector {
 
   [[nodiscard]] ContactMode mode() const { return mode_; }
   /// When the mode began; nothing while it is unknown.
-  [[nodiscard]] std::optional<TimeNs> since_ns() const;
+  [[nodiscard]] std::optional<TimeNs> since_ns() const { return since_ns_; }
   /// Beams that give the same range again and again.
   [[nodiscard]] std::bitset<kMaxBeams> stuck_beams() const {
     return ground_ ? ground_->stuck_beams() : std::bitset<kMaxBeams>{};
   }
 
  private:
-  static constexpr TimeNs kNever = std::numeric_limits<TimeNs>::min() / 2;
-
   ContactEvent change(ContactMode mode, TimeNs t_ns);
-  ContactEvent look_for_first_evidence(TimeNs t_ns);
-  ContactEvent look_for_takeoff(const GroundTracker::Sighting& sighting, TimeNs t_ns);
-  ContactEvent look_for_touchdown(TimeNs t_ns);
-  ContactEvent look_for_confirmed_touchdown(TimeNs t_ns);
+  ContactEvent look_for_strike(TimeNs t_ns);
   [[nodiscard]] bool lasts(bool holds, TimeNs t_ns, double duration);
   [[nodiscard]] bool height_known() const;
-  [[nodiscard]] double tolerance(bool all_agree) const;
+  [[nodiscard]] bool airborne(const GroundTracker::Sighting& sighting) const;
+  [[nodiscard]] bool stands() const;
   void roll(const WheelIncrement& increment);
 
   ContactConfig config_;
@@ -67,11 +65,11 @@ class ContactDetector {
   Eigen::Vector3d b_g_ = Eigen::Vector3d::Zero();
 
   ContactMode mode_ = ContactMode::unknown;
-  TimeNs since_ns_ = kNever;
-  TimeNs holds_since_ns_ = kNever;  ///< first reading in a row that speaks for a change
-  TimeNs seen_ns_ = kNever;         ///< last reading that agreed with the plane tracked
-  TimeNs last_imu_ns_ = kNever;
-  TimeNs strike_ns_ = kNever;
+  std::optional<TimeNs> since_ns_;
+  std::optional<TimeNs> holds_since_ns_;  ///< first reading in a row that speaks for a change
+  std::optional<TimeNs> seen_ns_;         ///< last reading that agreed with the plane tracked
+  std::optional<TimeNs> last_imu_ns_;
+  std::optional<TimeNs> strike_ns_;
   double body_angle_ = 0.0;       ///< about the axle since the last increment [rad], nose-down positive
   double recent_distance_ = 0.0;  ///< rolled just now [m]
   double level_ = 0.0;            ///< height of standing wheels over the plane, which the ground's shape explains [m]

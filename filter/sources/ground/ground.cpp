@@ -7,16 +7,9 @@
 #include "filter/sources/ground/ground_rows.h"
 
 namespace ear {
-namespace {
-
-constexpr double kSpinUp = 0.1;     // [s] chosen: after a touchdown until the wheels roll
-constexpr double kLevelOff = 0.05;  // [m] chosen: of a plane from the wheels that stand on it
-constexpr double kLeanOff = 0.2;    // chosen: sine of the axle's angle to it
-
-}  // namespace
 
 Ground::Ground(const FilterConfig& config, const Calibration& calibration)
-    : config_(config.odometer), contact_(config.contact, calibration) {
+    : config_(config.odometer), level_off_(config.contact.confirmed_height), contact_(config, calibration) {
   const bool lasers = calibration.lasers && !calibration.lasers->beams.empty();
   if (lasers && config.odometer.model == OdometerModel::terrain) lasers_ = calibration.lasers;
 }
@@ -29,7 +22,7 @@ ContactEvent Ground::note(ContactEvent event) {
 
 bool Ground::rolls_at(TimeNs t_ns) const {
   const std::optional<TimeNs> since_ns = contact_.since_ns();
-  return carries() && (!since_ns || seconds_between(*since_ns, t_ns) > kSpinUp);
+  return carries() && (!since_ns || seconds_between(*since_ns, t_ns) > kLanding);
 }
 
 void Ground::update(const BeamRanges& reading, const ImuBuffer& imu, CameraUpdate calibration, Ekf& ekf,
@@ -81,8 +74,8 @@ bool Ground::restart(const BeamRanges& reading, const Eigen::Matrix3d& R_WB, Ekf
   const Eigen::Vector3d range(reading.range[0], reading.range[1], reading.range[2]);
   const std::optional<GroundPlane> plane = plane_through_hits(lasers_->beams, range, o.T_BO.p);
   if (!plane) return true;
-  const bool carries = std::abs(plane->height - o.wheel_radius.mean()) < kLevelOff &&
-                       std::abs(plane->n_B.dot(o.T_BO.R.col(1))) < kLeanOff;
+  const bool carries = std::abs(plane->height - o.wheel_radius.mean()) < level_off_ &&
+                       std::abs(plane->n_B.dot(o.T_BO.R.col(1))) < kSlope;
   if (!running_.misplaced_since_ns) running_.misplaced_since_ns = reading.t_ns;
   if (!carries && seconds_between(*running_.misplaced_since_ns, reading.t_ns) < kStale) return false;
   ekf.restart_normal(carries ? Eigen::Vector3d((R_WB * plane->n_B).normalized()) : Eigen::Vector3d::UnitZ());

@@ -56,6 +56,7 @@ class Ground {
   };
 
   OdometerConfig config_;
+  double level_off_;                        ///< [m] a plane that is farther from the wheels is not the one below them
   std::optional<LaserCalibration> lasers_;  ///< where they are used
   ContactDetector contact_;
   Running running_;

@@ -5,33 +5,26 @@
 #include <cmath>
 
 #include "filter/ekf/so3.h"
+#include "filter/ingest/evidence.h"
 #include "filter/ingest/silence.h"
 
 namespace ear {
 namespace {
 
-constexpr double kUnevenness = 0.004;    // [m] chosen: of the ground under a beam against the plane
-constexpr double kNormalWalk = 0.1;      // [rad/sqrt(m)] chosen: how the normal changes with the distance
-constexpr double kSlope = 0.2;           // [rad] chosen: standard deviation of the ground's slopes
-constexpr double kNoChance = 0.07;       // [s] chosen: readings that are equal, or that agree again, for so long,
-constexpr int kFewestEqual = 4;          // chosen: and so many; noise makes two equal ones a chance of some percent
-constexpr double kSteepest = 0.8;        // [rad] chosen: ground that is tilted more is none
-constexpr double kUpTime = 3.0;          // [s] chosen: over which the specific force is against gravity in the mean
-constexpr double kNormalDrift = 0.02;    // [rad/sqrt(s)] chosen: what is left of the gyroscope's errors
-constexpr double kClimbWalk = 0.3;       // [m/s/sqrt(s)] chosen
-constexpr double kUnknownNormal = 0.25;  // [rad] chosen: of the body's tilt against the ground
-constexpr double kUnknownHeight = 4.0;   // [m] chosen
-constexpr double kUnknownClimb = 1.0;    // [m/s] chosen: at first, and what a strike changes
-constexpr double kGate = 4.0;            // chosen: standard deviations
-constexpr double kReturnGate = 2.0;      // chosen: the same for a beam that disagreed before
-constexpr double kLostTime = 0.03;       // [s] chosen: readings without any agreement, until all is forgotten
+constexpr double kUnevenness = 0.004;  // [m] chosen: of the ground under a beam against the plane
+constexpr double kClimbWalk = 0.3;     // [m/s/sqrt(s)] chosen
+constexpr double kReturnGate = 2.0;    // chosen: standard deviations, of a beam that disagreed before; else kClear
+constexpr double kSteepest = 0.8;      // [rad] chosen: ground that is tilted more is none
+constexpr double kUpTime = 3.0;        // [s] chosen: over which the specific force is against gravity in the mean
 
 }  // namespace
 
-GroundTracker::GroundTracker(const LaserCalibration& lasers, const EncoderCalibration& axle)
+GroundTracker::GroundTracker(const LaserCalibration& lasers, const EncoderCalibration& axle,
+                             const OdometerConfig& config)
     : lasers_(lasers),
       p_BO_(axle.T_BO.translation()),
       radius_(0.5 * (axle.wheel_radius[0] + axle.wheel_radius[1])),
+      normal_walk_(config.normal_walk),
       beams_(lasers.beams.size()) {
   x_.head<3>() = axle.T_BO.linear().col(2);
   forget();
@@ -44,7 +37,6 @@ void GroundTracker::turn(const Eigen::Vector3d& angle_B, const Eigen::Vector3d& 
   x_.head<3>() = R * x_.head<3>();
   P_.topRows<3>() = R * P_.topRows<3>();
   P_.leftCols<3>() = P_.leftCols<3>() * R.transpose();
-  widen_normal(kNormalDrift * kNormalDrift * dt);
 
   const Eigen::Vector3d force_B = accel_B.normalized();
   up_B_ = up_B_.isZero() ? force_B : Eigen::Vector3d(R * up_B_ + dt / kUpTime * (force_B - up_B_)).normalized();
@@ -54,12 +46,12 @@ void GroundTracker::turn(const Eigen::Vector3d& angle_B, const Eigen::Vector3d& 
 /// for every metre settles at a standard deviation of `slope`.
 void GroundTracker::move(double distance) {
   if (!(distance > 0.0) || up_B_.isZero()) return;
-  widen_normal(kNormalWalk * kNormalWalk * distance);
-  const double variance = std::pow(kSlope, 4) / (kNormalWalk * kNormalWalk * distance);
+  widen_normal(normal_walk_ * normal_walk_ * distance);
+  const double variance = std::pow(kSlope, 4) / (normal_walk_ * normal_walk_ * distance);
   for (int axis = 0; axis < 3; ++axis) update(Vector::Unit(axis), up_B_(axis) - x_(axis), variance);
 }
 
-void GroundTracker::strike() { P_(kClimb, kClimb) += kUnknownClimb * kUnknownClimb; }
+void GroundTracker::strike() { P_(kClimb, kClimb) += kFlightSpeed * kFlightSpeed; }
 
 void GroundTracker::suppose_height(double level, double sigma) {
   const Vector H = Vector::Unit(kHeight);
@@ -67,8 +59,7 @@ void GroundTracker::suppose_height(double level, double sigma) {
 }
 
 GroundTracker::Sighting GroundTracker::update(const LaserSample& sample) {
-  const double dt = any_ ? seconds_between(last_ns_, sample.t_ns) : 0.0;
-  any_ = true;
+  const double dt = last_ns_ ? seconds_between(*last_ns_, sample.t_ns) : 0.0;
   last_ns_ = sample.t_ns;
   if (dt > kStale) forget();
   predict(dt);
@@ -77,55 +68,44 @@ GroundTracker::Sighting GroundTracker::update(const LaserSample& sample) {
   const Eigen::Vector3d before_B = n_B();
   const std::size_t count = std::min(lasers_.beams.size(), sample.range.size());
   for (std::size_t i = 0; i < count; ++i) {
-    if (!usable(beams_[i], sample.range[i], sample.t_ns)) continue;
+    if (!usable(beams_[i], sample.range[i])) continue;
     ++sighting.readings;
     const Eigen::Vector3d hit_B = lasers_.beams[i].p_BL + sample.range[i] * lasers_.beams[i].d_B - p_BO_;
-    if (!update_with_hit(beams_[i], lasers_.beams[i].d_B, hit_B, sample.t_ns)) continue;
+    if (!update_with_hit(beams_[i], lasers_.beams[i].d_B, hit_B)) continue;
     const double lift = -before_B.dot(hit_B) - radius_;
     sighting.lowest_lift = sighting.agreeing == 0 ? lift : std::min(sighting.lowest_lift, lift);
     ++sighting.agreeing;
   }
-  if (sighting.agreeing > 0) lost_from_ns_.reset();
-  if (sighting.agreeing == 0 && sighting.readings >= 2 && !lost_from_ns_) lost_from_ns_ = sample.t_ns;
-  const bool lost = lost_from_ns_ && sighting.readings >= 2 && seconds_between(*lost_from_ns_, sample.t_ns) > kLostTime;
-  if (lost || (!up_B_.isZero() && n_B().dot(up_B_) < std::cos(kSteepest))) forget();
+  if (sighting.agreeing > 0) lost_ = 0;
+  if (sighting.agreeing == 0 && sighting.readings >= 2) ++lost_;
+  if (lost_ >= kConfirmed || (!up_B_.isZero() && n_B().dot(up_B_) < std::cos(kSteepest))) forget();
   return sighting;
 }
 
 /// A return that is not always the same: noise makes each reading of a working beam another one.
-bool GroundTracker::usable(Beam& beam, double range, TimeNs t_ns) const {
-  if (range != beam.last) {
-    beam.same = 0;
-    beam.same_from_ns = t_ns;
-  }
+bool GroundTracker::usable(Beam& beam, double range) const {
+  beam.same = range == beam.last ? beam.same + 1 : 1;
   beam.last = range;
-  beam.stuck = ++beam.same >= kFewestEqual && seconds_between(beam.same_from_ns, t_ns) > kNoChance;
-  return !beam.stuck && range >= lasers_.range_min && range <= lasers_.range_max;
+  return !beam.stuck() && range >= lasers_.range_min && range <= lasers_.range_max;
 }
 
 std::bitset<kMaxBeams> GroundTracker::stuck_beams() const {
   std::bitset<kMaxBeams> stuck;
-  for (std::size_t i = 0; i < beams_.size(); ++i) stuck[i] = beams_[i].stuck;
+  for (std::size_t i = 0; i < beams_.size(); ++i) stuck[i] = beams_[i].stuck();
   return stuck;
 }
 
 /// 0 = n_B . hit + r + h, linear in the state. False if the beam is not used.
-bool GroundTracker::update_with_hit(Beam& beam, const Eigen::Vector3d& d_B, const Eigen::Vector3d& hit_B, TimeNs t_ns) {
+bool GroundTracker::update_with_hit(Beam& beam, const Eigen::Vector3d& d_B, const Eigen::Vector3d& hit_B) {
   Vector H = Vector::Unit(kHeight);
   H.head<3>() = hit_B;
   const double residual = -(n_B().dot(hit_B) + radius_ + height());
   const double noise = n_B().dot(d_B) * lasers_.noise;
   const double variance = noise * noise + kUnevenness * kUnevenness;
-  if (!passes(H, residual, variance, beam.returning ? kReturnGate : kGate)) {
-    beam.returning = true;
-    beam.agrees_from_ns.reset();
-    return false;
-  }
-  if (beam.returning) {
-    if (!beam.agrees_from_ns) beam.agrees_from_ns = t_ns;
-    if (seconds_between(*beam.agrees_from_ns, t_ns) < kNoChance) return false;
-    beam.returning = false;
-  }
+  beam.agrees = passes(H, residual, variance, beam.agrees < kNoChance ? kReturnGate : kClear)
+                    ? std::min(beam.agrees + 1, kNoChance)
+                    : 0;
+  if (beam.agrees < kNoChance) return false;
   update(H, residual, variance);
   return true;
 }
@@ -162,12 +142,12 @@ void GroundTracker::widen_normal(double variance) {
 void GroundTracker::forget() {
   P_.setZero();
   if (!up_B_.isZero()) x_.head<3>() = up_B_;
-  widen_normal(kUnknownNormal * kUnknownNormal);
-  P_(kHeight, kHeight) = kUnknownHeight * kUnknownHeight;
-  P_(kClimb, kClimb) = kUnknownClimb * kUnknownClimb;
+  widen_normal(kSlope * kSlope);
+  P_(kHeight, kHeight) = lasers_.range_max * lasers_.range_max;
+  P_(kClimb, kClimb) = kFlightSpeed * kFlightSpeed;
   x_(kClimb) = 0.0;
-  for (Beam& beam : beams_) beam.returning = false;
-  lost_from_ns_.reset();
+  for (Beam& beam : beams_) beam.agrees = kNoChance;
+  lost_ = 0;
 }
 
 }  // namespace ear

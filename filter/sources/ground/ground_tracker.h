@@ -12,14 +12,20 @@
 #include <vector>
 
 #include "ear/calibration.h"
+#include "ear/filter_config.h"
 #include "ear/types.h"
 #include "filter/ingest/beam_ranges.h"
 
 namespace ear {
 
+/// [rad] chosen: standard deviation of the ground's slopes, and so of its normal before anything shows it.
+inline constexpr double kSlope = 0.2;
+/// [m/s] chosen: of a vehicle in flight, up, down, and over the ground.
+inline constexpr double kFlightSpeed = 1.0;
+
 class GroundTracker {
  public:
-  GroundTracker(const LaserCalibration& lasers, const EncoderCalibration& axle);
+  GroundTracker(const LaserCalibration& lasers, const EncoderCalibration& axle, const OdometerConfig& config);
 
   /// The body turned by `angle_B` [rad] in `dt` [s], and felt the specific force `accel_B` [m/s^2].
   void turn(const Eigen::Vector3d& angle_B, const Eigen::Vector3d& accel_B, double dt);
@@ -53,33 +59,33 @@ class GroundTracker {
   using Vector = Eigen::Matrix<double, kSize, 1>;
   using Matrix = Eigen::Matrix<double, kSize, kSize>;
 
+  /// Chosen: readings in a row that are equal, or agree again; noise makes two equal ones a chance of some percent.
+  static constexpr int kNoChance = 5;
   struct Beam {
-    double last = 0.0;        ///< range [m]
-    int same = 0;             ///< readings in a row with this range
-    TimeNs same_from_ns = 0;  ///< the first of them
-    bool stuck = false;
-    std::optional<TimeNs> agrees_from_ns;  ///< a beam that disagreed is used again after it has agreed for some time
-    bool returning = false;
+    double last = 0.0;       ///< range [m]
+    int same = 0;            ///< readings in a row with this range
+    int agrees = kNoChance;  ///< readings in a row; a beam that disagreed is used again after some that agree
+    [[nodiscard]] bool stuck() const { return same >= kNoChance; }
   };
 
-  [[nodiscard]] bool usable(Beam& beam, double range, TimeNs t_ns) const;
+  [[nodiscard]] bool usable(Beam& beam, double range) const;
   void predict(double dt);
   void forget();
   void widen_normal(double variance);
-  bool update_with_hit(Beam& beam, const Eigen::Vector3d& d_B, const Eigen::Vector3d& hit_B, TimeNs t_ns);
+  bool update_with_hit(Beam& beam, const Eigen::Vector3d& d_B, const Eigen::Vector3d& hit_B);
   [[nodiscard]] bool passes(const Vector& H, double residual, double variance, double gate) const;
   void update(const Vector& H, double residual, double variance);
 
   LaserCalibration lasers_;
   Eigen::Vector3d p_BO_;
   double radius_;
+  double normal_walk_;
   Eigen::Vector3d up_B_ = Eigen::Vector3d::Zero();  ///< against gravity, roughly; zero before the first sample
   Vector x_ = Vector::Zero();                       ///< n_B, height, climb
   Matrix P_ = Matrix::Zero();
   std::vector<Beam> beams_;
-  std::optional<TimeNs> lost_from_ns_;  ///< readings of which none agreed, in a row: the first
-  bool any_ = false;
-  TimeNs last_ns_ = 0;
+  int lost_ = 0;  ///< readings in a row of which no beam agreed
+  std::optional<TimeNs> last_ns_;
 };
 
 }  // namespace ear
