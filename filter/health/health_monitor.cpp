@@ -203,7 +203,7 @@ void HealthMonitor::decide(TimeNs t_ns) {
   }
   const bool usable = last_.running && last_.possible && seconds_between(life_.aided_ns, t_ns) < kLostAfter &&
                       velocity_known() && !life_.contradicted;
-  const bool proven = !lost() || seconds_between(life_.unproven_ns, t_ns) >= FaultState::kSoundAfter;
+  const bool proven = !lost() || duration_ns(life_.unproven_ns, t_ns) >= FaultState::kSoundAfter;
   const double sigma = std::max(health_.horizontal_sigma, health_.vertical_sigma);
   health_.imprecise = 2.0 * sigma > std::max(kPreciseEnough, kPrecise * life_.travelled);
   health_.misaligned = last_.misaligned;
