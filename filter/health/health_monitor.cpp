@@ -117,15 +117,12 @@ void HealthMonitor::add_frame(const Frame& frame, const std::array<SourceRecord,
     last_.agreement = before.agreement;
   }
   arrivals_.refused_imu_ns.reset();
-  if (frame.image) {
+  if (frame.image)
     images_.add({t_ns, arrivals_.imu_ns.value_or(t_ns), frame.running, frame.agreement, frame.statistics});
-    if (frame.running && frame.possible && images_.interval() > 0.0) {
-      rotation_.add(frame.agreement, images_.interval(), frame.statistics.wheel_rows_rejected > 0, t_ns);
-    }
-  }
   if (wheels_) judge_ground(frame, records);
-  faults_[index_of(Source::gyroscope)].add(rotation_.differs(), t_ns);
-  faults_[index_of(Source::accelerometer)].add(false, t_ns);
+  for (const Source source : {Source::gyroscope, Source::accelerometer}) {
+    faults_[index_of(source)].add(records[index_of(source)].rejected > 0, t_ns);
+  }
 
   if (usable() && before.running && frame.running) life_.travelled += frame.speed * seconds_between(before.t_ns, t_ns);
   health_.sources = records;

@@ -39,7 +39,6 @@ class ImageHealth {
 
   /// Did one come not long ago?
   [[nodiscard]] bool come(TimeNs t_ns) const;
-  [[nodiscard]] double interval() const { return interval_; }  ///< usual, of the images [s]
   /// Do the images carry the estimate? They may where some of what they show is wrong, and where they come late but
   /// fit.
   [[nodiscard]] bool carry() const { return carrying_.sound() || late_; }
