@@ -13,7 +13,6 @@ namespace ear {
 
 class ImageHealth {
  public:
-  static constexpr double kManyOff = 0.3;  // chosen: of the features off their place; images carry the estimate no more
   static constexpr double kFitMemory = 1.0;  // [s] chosen: of what fits; contradicted for so long, the state is lost
 
   /// `cameras`: 0 to 2.
