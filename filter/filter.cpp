@@ -3,13 +3,9 @@
 #include <utility>
 
 #include "filter/ekf/initial_state.h"
+#include "filter/ingest/silence.h"
 
 namespace ear {
-namespace {
-
-constexpr double kJumpNoticed = 0.3;  // [s] chosen: until a bias that jumped is found out
-
-}  // namespace
 
 Filter::Filter(const FilterConfig& config, const Calibration& calibration)
     : CommonEstimator(settings_for(checked(config), checked(calibration)), calibration,
@@ -54,7 +50,7 @@ void Filter::propagate_to(const FeatureFrame& frame) {
   const TimeNs t_ns = begin_frame(frame);
   if (ekf_.running()) {
     consistency_ = consistency_check_(sources_.displacements(frame, t_ns, ingest_, ekf_, sources_.ground().known()));
-    sources_.score_imu(frame, consistency_, ekf_);
+    sources_.score_imu(frame, consistency_, ekf_, records_);
     sources_.advance(t_ns, advice(), ingest_, ekf_, records_);
   }
   if (!ekf_.running() || health_.lost()) {
@@ -64,15 +60,14 @@ void Filter::propagate_to(const FeatureFrame& frame) {
   }
 }
 
-/// A bias that jumped took the motion along until it was found out. Both are less well known by what was observed. By
-/// wheels alone it looks the same as a wheel that slips.
+/// A bias that jumped took the motion along until it was found out, for as long as the watch remembers. Both are less
+/// well known by what was observed. By wheels alone it looks the same as a wheel that slips.
 void Filter::watch_biases() {
   if (!sources_.cameras().show_motion(ekf_.state())) ekf_.discard_bias_changes();
   const TimeNs t_ns = ekf_.state().imu.t_ns;
   const BiasJump jump = bias_watch_.judge(ekf_.take_bias_changes(), t_ns);
   if (!jump.any()) return;
-  ekf_.inflate_motion(jump.gyro * kJumpNoticed, jump.accel * kJumpNoticed,
-                      0.5 * jump.accel * kJumpNoticed * kJumpNoticed);
+  ekf_.inflate_motion(jump.gyro * kStale, jump.accel * kStale, 0.5 * jump.accel * kStale * kStale);
   ekf_.inflate_biases(jump.gyro, jump.accel);
   health_.report_imu_fault(jump.fault, t_ns);
 }

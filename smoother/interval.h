@@ -5,8 +5,8 @@
 #include <optional>
 
 #include "ear/types.h"
-#include "filter/sources/wheels/wheel_preintegration.h"
 #include "smoother/imu_preintegration.h"
+#include "smoother/wheel_preintegration.h"
 
 namespace ear::smoother {
 

@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "filter/ekf/propagation.h"
-#include "filter/sources/wheels/wheel_displacement.h"
 
 namespace ear::smoother {
 namespace {

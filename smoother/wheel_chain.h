@@ -1,7 +1,7 @@
 // Two displacements of the wheels in a row as one.
 #pragma once
 
-#include "filter/sources/wheels/wheel_preintegration.h"
+#include "smoother/wheel_preintegration.h"
 
 namespace ear::smoother {
 

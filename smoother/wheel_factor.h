@@ -4,8 +4,8 @@
 
 #include <ceres/sized_cost_function.h>
 
-#include "filter/sources/wheels/wheel_preintegration.h"
 #include "smoother/blocks.h"
+#include "smoother/wheel_preintegration.h"
 
 namespace ear::smoother {
 

@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "filter/ingest/silence.h"
+
 namespace ear {
 namespace {
 
-constexpr double kMoved = 1.0;       // [s] chosen: a jump is found piece by piece
-constexpr double kMemory = 0.5;      // [s] chosen
 constexpr double kSigmas = 6.0;      // chosen: of the sum of the corrections: these do not happen by chance
 constexpr double kGyroFault = 5e-3;  // [rad/s] measured: on sound sensors of public recordings up to 2.2e-3
 constexpr double kAccelFault = 0.1;  // [m/s^2] measured: the same, up to 0.036
@@ -32,11 +32,11 @@ BiasJump BiasWatch::judge(const BiasChanges& changes, TimeNs t_ns) {
     sum_.correction(i) = sum_.variance_lowered(i) = 0.0;
   }
   const double dt = seconds_between(judged_ns_, t_ns);
-  const double kept = std::exp(-dt / kMemory);
+  const double kept = std::exp(-dt / kStale);
   judged_ns_ = t_ns;
   sum_.correction *= kept;
   sum_.variance_lowered *= kept * kept;
-  moved_ *= std::exp(-dt / kMoved);
+  moved_ *= kept;
   return jump;
 }
 

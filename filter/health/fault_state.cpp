@@ -3,20 +3,16 @@
 #include <algorithm>
 
 namespace ear {
-namespace {
-
-constexpr double kRounding = 1e-9;  // chosen: of sums that should be 1
-
-}  // namespace
 
 void FaultState::add(bool wrong, TimeNs t_ns) {
-  const double dt = last_ns_ ? std::clamp(seconds_between(*last_ns_, t_ns), 0.0, kFaultyAfter) : 0.0;
+  const TimeNs dt = last_ns_ ? std::clamp(duration_ns(*last_ns_, t_ns), TimeNs{0}, kFaultyAfter) : 0;
   last_ns_ = t_ns;
   if (wrong && !suspected_) onset_ns_ = t_ns;
-  suspected_ = wrong || suspicion_ > 0.0;
-  suspicion_ = std::clamp(suspicion_ + (wrong ? dt / kFaultyAfter : -dt / kSoundAfter), 0.0, 1.0);
-  if (suspicion_ > 1.0 - kRounding) sound_ = false;
-  if (suspicion_ <= 0.0 && !wrong) {
+  suspected_ = wrong || suspicion_ > 0;
+  const TimeNs change = wrong ? dt : -dt * kFaultyAfter / kSoundAfter;
+  suspicion_ = std::clamp(suspicion_ + change, TimeNs{0}, kFaultyAfter);
+  if (suspicion_ == kFaultyAfter) sound_ = false;
+  if (suspicion_ == 0 && !wrong) {
     sound_ = true;
     suspected_ = false;
   }
@@ -25,13 +21,13 @@ void FaultState::add(bool wrong, TimeNs t_ns) {
 void FaultState::report(TimeNs t_ns) {
   if (!suspected_) onset_ns_ = t_ns;
   suspected_ = true;
-  suspicion_ = 1.0;
+  suspicion_ = kFaultyAfter;
   sound_ = false;
   last_ns_ = t_ns;
 }
 
 void FaultState::clear(TimeNs t_ns) {
-  suspicion_ = 0.0;
+  suspicion_ = 0;
   suspected_ = false;
   sound_ = true;
   last_ns_ = t_ns;

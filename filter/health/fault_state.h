@@ -7,11 +7,11 @@
 
 namespace ear {
 
-/// Mostly wrong for kFaultyAfter seconds, it is faulty; mostly right for kSoundAfter, it is sound again.
+/// Mostly wrong for kFaultyAfter, it is faulty; mostly right for kSoundAfter, it is sound again.
 class FaultState {
  public:
-  static constexpr double kFaultyAfter = 0.25;  // [s] chosen: docs/health.md promises half a second
-  static constexpr double kSoundAfter = 0.5;    // [s] chosen; a lost estimate must fit for so long, too
+  static constexpr TimeNs kFaultyAfter = 250'000'000;  // [ns] chosen: docs/health.md promises half a second
+  static constexpr TimeNs kSoundAfter = 500'000'000;   // [ns] chosen; a lost estimate must fit for so long, too
 
   /// What came since the last call: wrong or right. Long silence counts for kFaultyAfter at most.
   void add(bool wrong, TimeNs t_ns);
@@ -24,7 +24,7 @@ class FaultState {
   [[nodiscard]] TimeNs onset_ns() const { return onset_ns_; }
 
  private:
-  double suspicion_ = 0.0;  ///< 0 ... 1
+  TimeNs suspicion_ = 0;    ///< up to kFaultyAfter
   bool suspected_ = false;  ///< since onset_ns_
   bool sound_ = true;
   TimeNs onset_ns_ = 0;

@@ -118,15 +118,12 @@ void HealthMonitor::add_frame(const Frame& frame, const std::array<SourceRecord,
   }
   hold_wheels(before.statistics);
   arrivals_.refused_imu_ns.reset();
-  if (frame.image) {
+  if (frame.image)
     images_.add({t_ns, arrivals_.imu_ns.value_or(t_ns), frame.running, frame.agreement, frame.statistics});
-    if (frame.running && frame.possible && images_.interval() > 0.0) {
-      rotation_.add(frame.agreement, images_.interval(), frame.statistics.wheel_rows_rejected > 0, t_ns);
-    }
-  }
   if (wheels_) judge_ground(frame, records);
-  faults_[index_of(Source::gyroscope)].add(rotation_.differs(), t_ns);
-  faults_[index_of(Source::accelerometer)].add(false, t_ns);
+  for (const Source source : {Source::gyroscope, Source::accelerometer}) {
+    faults_[index_of(source)].add(records[index_of(source)].rejected > 0, t_ns);
+  }
 
   if (usable() && before.running && frame.running) life_.travelled += frame.speed * seconds_between(before.t_ns, t_ns);
   health_.sources = records;
@@ -216,7 +213,7 @@ void HealthMonitor::decide(TimeNs t_ns) {
   }
   const bool usable = last_.running && last_.possible && seconds_between(life_.aided_ns, t_ns) < kLostAfter &&
                       velocity_known() && !life_.contradicted;
-  const bool proven = !lost() || seconds_between(life_.unproven_ns, t_ns) >= FaultState::kSoundAfter;
+  const bool proven = !lost() || duration_ns(life_.unproven_ns, t_ns) >= FaultState::kSoundAfter;
   const double sigma = std::max(health_.horizontal_sigma, health_.vertical_sigma);
   health_.imprecise = 2.0 * sigma > std::max(kPreciseEnough, kPrecise * life_.travelled);
   health_.misaligned = last_.misaligned;

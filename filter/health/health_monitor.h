@@ -12,7 +12,6 @@
 #include "ear/health.h"
 #include "filter/health/fault_state.h"
 #include "filter/health/image_health.h"
-#include "filter/health/rotation_check.h"
 #include "filter/ingest/beam_ranges.h"
 #include "filter/ingest/imu_spike.h"
 #include "filter/ingest/input_guard.h"
@@ -110,7 +109,6 @@ class HealthMonitor {
   bool wheels_;
   std::array<FaultState, kSourceCount> faults_;  ///< of all but the cameras
   ImageHealth images_;
-  RotationCheck rotation_;
   std::array<bool, kMaxBeams> no_return_{};
   Arrivals arrivals_;
   Life life_;

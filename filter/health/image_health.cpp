@@ -4,16 +4,14 @@
 #include <cmath>
 
 #include "filter/ingest/silence.h"
+#include "filter/ingest/stream_clock.h"
 
 namespace ear {
 namespace {
 
 constexpr double kSomeOff = 0.1;        // chosen: of the features off their place; a camera may be faulty
-constexpr double kNoisy = 1.5;          // chosen: times the usual noise of a feature: as little
-constexpr double kFewStereo = 0.25;     // chosen: of the features; less are seen by the right camera
-constexpr double kSparse = 0.4;         // chosen: of the usual number of features
+constexpr double kSparse = 0.4;         // chosen: of the usual number of features, or of the left camera's
 constexpr double kTracksMemory = 20.0;  // [s] chosen
-constexpr double kIntervalShare = 0.1;  // chosen: of each new interval in the usual one
 
 /// Left and right are exchanged: the stereo features seem to be behind the cameras.
 bool crossed(const FrameAgreement& seen) { return seen.behind > kMajority; }
@@ -22,7 +20,7 @@ bool crossed(const FrameAgreement& seen) { return seen.behind > kMajority; }
 
 bool ImageHealth::check(const FrameAgreement& seen, TimeNs t_ns, TimeNs newest_imu_ns) {
   stamps_unusual_ = stamps_.add(t_ns, newest_imu_ns);
-  const bool elsewhere = seen.matches > 0 && seen.left > kManyOff;
+  const bool elsewhere = seen.matches > 0 && seen.left > kMajority;
   stamps_wrong_ = stamps_unusual_ && (stamps_wrong_ || elsewhere);
   return !seen.frozen && !crossed(seen) && !stamps_wrong_;
 }
@@ -30,12 +28,12 @@ bool ImageHealth::check(const FrameAgreement& seen, TimeNs t_ns, TimeNs newest_i
 void ImageHealth::add(const Image& image) {
   if (arrival_ns_) {
     const double interval = std::min(seconds_between(last_ns_, image.t_ns), kStale);
-    interval_ += (interval_ == 0.0 ? 1.0 : kIntervalShare) * (interval - interval_);
+    interval_ += (interval_ == 0.0 ? 1.0 : 1.0 / kToKnow) * (interval - interval_);
   }
   last_ns_ = image.t_ns;
   arrival_ns_ = std::max(image.t_ns, image.newest_imu_ns);
   if (cameras_ > 0) judge(image);
-  late_ = stamps_unusual_ && !stamps_wrong_ && image.seen.matches > 0 && image.seen.left < kManyOff;
+  late_ = stamps_unusual_ && !stamps_wrong_ && image.seen.matches > 0 && image.seen.left < kMajority;
   if (stamps_unusual_) report(image.t_ns);
 }
 
@@ -44,17 +42,17 @@ void ImageHealth::judge(const Image& image) {
   const bool known = image.running && seen.matches > 0;
   const int tracks = image.statistics.tracks;
   const bool blind = tracks < kFewFeatures;
-  const bool poor = blind || tracks < kSparse * usual_tracks_ || seen.noise > kNoisy;
+  const bool poor = blind || tracks < kSparse * usual_tracks_ || seen.noise > 1.0;
   const double share = std::max(interval_ / kTracksMemory, 1.0 / (1.0 + counted_));
   usual_tracks_ += share * (tracks - usual_tracks_);
   ++counted_;
   const double kept = std::exp(-interval_ / kFitMemory);
   used_ = kept * used_ + image.statistics.features_used;
   rejected_ = kept * rejected_ + image.statistics.features_rejected;
-  carrying_.add(blind || misfit() || (known && seen.left > kManyOff), image.t_ns);
+  carrying_.add(blind || misfit() || (known && seen.left > kMajority), image.t_ns);
   left_.add(poor || misfit() || (known && seen.left > kSomeOff), image.t_ns);
   if (cameras_ == 2 && !seen.right_skipped) {
-    const bool one_eyed = image.statistics.stereo < kFewStereo * tracks;
+    const bool one_eyed = image.statistics.stereo < kSparse * tracks;
     right_.add(poor || one_eyed || (known && seen.right > kSomeOff), image.t_ns);
   }
   if (seen.frozen || crossed(seen)) report(image.t_ns);

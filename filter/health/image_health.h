@@ -13,7 +13,6 @@ namespace ear {
 
 class ImageHealth {
  public:
-  static constexpr double kManyOff = 0.3;  // chosen: of the features off their place; images carry the estimate no more
   static constexpr double kFitMemory = 1.0;  // [s] chosen: of what fits; contradicted for so long, the state is lost
 
   /// `cameras`: 0 to 2.
@@ -39,7 +38,6 @@ class ImageHealth {
 
   /// Did one come not long ago?
   [[nodiscard]] bool come(TimeNs t_ns) const;
-  [[nodiscard]] double interval() const { return interval_; }  ///< usual, of the images [s]
   /// Do the images carry the estimate? They may where some of what they show is wrong, and where they come late but
   /// fit.
   [[nodiscard]] bool carry() const { return carrying_.sound() || late_; }

@@ -3,6 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "filter/ekf/so3.h"
+#include "filter/ingest/evidence.h"
+#include "filter/ingest/silence.h"
+
 namespace ear {
 namespace {
 
@@ -19,8 +23,42 @@ void ImuScore::add_rest(const ImuStatistics& rest, const ImuCalibration& stated)
               std::max(1.0, rest.accel_density / stated.accel_noise)};
 }
 
-void ImuScore::add(const ImuMotion& motion, const StereoMotion& images, const Covariance& P, TimeNs t_ns) {
-  if (images.fitting < kStill * images.matches) return;
+/// A mean over many frames shows what is too small to be seen in one of them: a bias that jumped. The noise averages
+/// out in it; the bias as the state knows it does not, nor what the errors of the cameras' mounting, focal length and
+/// time offset make look like a turn.
+std::optional<Innovation> ImuScore::add_excess(const ExcessTurn& turn, const ImuMotion& motion, const Covariance& P,
+                                               TimeNs t_ns) {
+  Excess& e = excess_;
+  const double dt = motion.duration;
+  const double since = e.last_ns ? seconds_between(*e.last_ns, t_ns) : kStale;
+  const auto variance = [&P](int entry) { return std::max(0.0, P.matrix()(entry, entry)); };
+  const double mounting = P.matrix().diagonal().segment<3>(err::camera).cwiseMax(0.0).maxCoeff();
+  const Eigen::Vector3d rate_B = log_so3(motion.R_BiBj) / dt;
+  const Eigen::Vector3d change = since < kStale ? Eigen::Vector3d((rate_B - e.rate_B) / dt) : Eigen::Vector3d::Zero();
+  const double kept = std::exp(-std::max(0.0, since) / kStale);
+  e.count = kept * e.count + 1.0;
+  e.apparent = kept * e.apparent + rate_B.squaredNorm() * (mounting + variance(err::lens(0))) +
+               change.squaredNorm() * variance(err::time_offset);
+  e.rate_B = rate_B;
+  e.last_ns = t_ns;
+  const double noise = motion.turn_variance * std::pow(at_rest_.gyro / gyro_.weight(), 2);
+  Innovation worst;
+  for (int axis = 0; axis < 3; ++axis) {
+    e.rate(axis) = kept * e.rate(axis) + turn.value(axis) / dt;
+    e.variance(axis) = kept * kept * e.variance(axis) + (turn.covariance(axis, axis) + noise) / (dt * dt);
+    Innovation mean;
+    mean.value = e.rate(axis) / e.count;
+    mean.variance = e.variance(axis) / (e.count * e.count) + e.apparent / e.count + variance(err::b_g + axis);
+    mean.gate = kClear * kClear;
+    mean.fits = mean.value * mean.value <= mean.gate * mean.variance;
+    if (axis == 0 || mean.value * mean.value * worst.variance > worst.value * worst.value * mean.variance) worst = mean;
+  }
+  return worst;
+}
+
+std::optional<Innovation> ImuScore::add(const ImuMotion& motion, const StereoMotion& images, const Covariance& P,
+                                        TimeNs t_ns) {
+  if (images.fitting < kStill * images.matches) return std::nullopt;
   StereoMotion seen = images;
   seen.covariance *= kCommon;
   const Eigen::Matrix3d by_state = motion.by_state(P);
@@ -32,11 +70,13 @@ void ImuScore::add(const ImuMotion& motion, const StereoMotion& images, const Co
   }
   const Eigen::Matrix3d believed = by_state + motion.covariance * std::pow(at_rest_.accel / accel_.weight(), 2);
   const ExcessTurn turn = turn_beyond(seen, motion.R_BiBj, motion.p_BiBj, believed);
+  const std::optional<Innovation> excess = add_excess(turn, motion, P, t_ns);
   for (int axis = 0; axis < 3; ++axis) {
     const double bias = P.matrix()(err::b_g + axis, err::b_g + axis) * motion.duration * motion.duration;
     gyro_.add(turn.value(axis),
               {bias + turn.covariance(axis, axis), motion.turn_variance * at_rest_.gyro * at_rest_.gyro}, t_ns);
   }
+  return excess;
 }
 
 ImuNoiseFactors ImuScore::noise() const {

@@ -3,9 +3,13 @@
 // docs/filter.md, "Propagation".
 #pragma once
 
+#include <Eigen/Core>
+#include <optional>
+
 #include "filter/ekf/covariance.h"
 #include "filter/ekf/imu_displacement.h"
 #include "filter/ekf/noise_score.h"
+#include "filter/ekf/records.h"
 #include "filter/ingest/imu_buffer.h"
 #include "filter/sources/cameras/stereo_motion.h"
 
@@ -19,18 +23,32 @@ class ImuScore {
   /// Samples of a vehicle that stands, which show the white noise; `stated`: what the calibration says of it.
   void add_rest(const ImuStatistics& rest, const ImuCalibration& stated);
   /// The motion from the state to a frame at `t_ns` by the inertial samples, and as the images show it. `P`: of the
-  /// state's error.
-  void add(const ImuMotion& motion, const StereoMotion& images, const Covariance& P, TimeNs t_ns);
+  /// state's error. By how much the cameras turned faster than the gyroscope of late [rad/s], in the mean, about the
+  /// axis where it is least likely; nothing if the images show too little.
+  std::optional<Innovation> add(const ImuMotion& motion, const StereoMotion& images, const Covariance& P, TimeNs t_ns);
 
   /// Factors on the noise of all samples, 1 or more.
   [[nodiscard]] ImuNoiseFactors noise() const;
 
  private:
+  /// Means over the last moments, which forget in kStale.
+  struct Excess {
+    double count = 0.0;
+    Eigen::Vector3d rate = Eigen::Vector3d::Zero();      ///< sum of the turns beyond the gyroscope's, over time [rad/s]
+    Eigen::Vector3d variance = Eigen::Vector3d::Zero();  ///< of this sum, by noise
+    double apparent = 0.0;                               ///< sum of the variances by the cameras' calibration
+    Eigen::Vector3d rate_B = Eigen::Vector3d::Zero();    ///< the gyroscope's, the last one [rad/s]
+    std::optional<TimeNs> last_ns;
+  };
+  std::optional<Innovation> add_excess(const ExcessTurn& turn, const ImuMotion& motion, const Covariance& P,
+                                       TimeNs t_ns);
+
   static constexpr double kMemory = 2.0;      // [s] chosen: a single image that is wrong changes little,
   static constexpr double kFarthest = 100.0;  // chosen: counting as ten times the usual noise at most
 
   bool adapts_;
   ImuNoiseFactors at_rest_;  ///< on the stated noise, when it last stood
+  Excess excess_;
   NoiseScore gyro_{kMemory, kFarthest}, accel_{kMemory, kFarthest};
 };
 

@@ -60,10 +60,11 @@ Displacements Sources::displacements(const FeatureFrame& frame, TimeNs t_ns, con
   return result;
 }
 
-void Sources::score_imu(const FeatureFrame& frame, const Consistency& consistency, const Ekf& ekf) {
+void Sources::score_imu(const FeatureFrame& frame, const Consistency& consistency, const Ekf& ekf, Records& records) {
   const std::optional<StereoMotion>& seen = cameras_.seen();
   if (!seen || frame.repeated || consistency.anomalous == MotionSensor::camera) return;
-  imu_score_.add(motion_, *seen, ekf.covariance(), frame.t_ns);
+  const std::optional<Innovation> turn = imu_score_.add(motion_, *seen, ekf.covariance(), frame.t_ns);
+  if (turn) records.log.add(Source::gyroscope, *turn, ekf.state().imu.t_ns);
 }
 
 void Sources::advance(TimeNs t_ns, const Advice& advice, Ingest& ingest, Ekf& ekf, Records& records) {

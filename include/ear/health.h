@@ -72,8 +72,8 @@ inline constexpr std::array<const char*, kSourceCount> kSourceNames{"camera_left
 enum class Aiding : std::uint8_t { none, standing, wheels, cameras, cameras_and_wheels };
 
 /// The last measurement of one source, against what was expected. Cameras: root mean square over the features tested
-/// [px]; wheels: speed over the ground [m/s]; beams: range [m]. The inertial sensors, which nothing predicts, have a
-/// score only.
+/// [px]; wheels: speed over the ground [m/s]; beams: range [m]; gyroscope: how much faster the cameras turned, mean of
+/// half a second [rad/s]. The accelerometer, which nothing predicts, has a score only.
 struct SourceRecord {
   double innovation = 0.0;  ///< measured - predicted
   double variance = 0.0;    ///< of the innovation, as expected

@@ -3,6 +3,7 @@
 #include <doctest/doctest.h>
 
 #include <Eigen/Cholesky>
+#include <cmath>
 #include <random>
 
 #include "filter/ekf/so3.h"
@@ -28,33 +29,63 @@ Eigen::Matrix<double, 6, 6> covariance_of_images() {
   return sigma.asDiagonal() * correlation * sigma.asDiagonal();
 }
 
-/// The score after `seconds` with inertial noise of so many times the stated one. `bias`: of every displacement that
-/// the images show, along their least certain direction.
-ImuScore score_after(double seconds, double gyro, double accel, double bias, unsigned seed) {
+/// What inertial sensors and images are like.
+struct Rig {
+  double gyro = 1.0, accel = 1.0;  ///< noise, so many times the stated one
+  double shift = 0.0;              ///< of every displacement that the images show, along their least certain direction
+  double gyro_bias = 0.0;          ///< [rad/s] about z, of which the state knows nothing
+  double turn_rate = 0.0;          ///< [rad/s] about x
+  double mounting = 0.0;           ///< [rad] standard deviation of the cameras'
+  double time_offset = 0.0;        ///< [s] standard deviation
+};
+
+/// The score after some time, and how the rates were judged in it.
+struct Judged {
+  ImuScore score{true};
+  int fit = 0, unfit = 0;
+};
+
+Judged judged_after(double seconds, const Rig& rig, unsigned seed) {
   std::mt19937_64 rng{seed};
   std::normal_distribution<double> normal;
   const auto draw = [&](int n) { return Eigen::VectorXd::NullaryExpr(n, [&] { return normal(rng); }).eval(); };
+  Eigen::VectorXd sigma = Eigen::VectorXd::Zero(err::clones);
+  sigma.segment<3>(err::camera).setConstant(rig.mounting);
+  sigma(err::time_offset) = rig.time_offset;
   Covariance P(err::clones);
-  P.reset(Eigen::VectorXd::Zero(err::clones));
+  P.reset(sigma);
   const Eigen::Matrix<double, 6, 6> C = covariance_of_images();
   const Eigen::Matrix<double, 6, 6> L = C.llt().matrixL();
-  ImuScore score(true);
+  Judged judged;
   for (TimeNs t_ns = 0; t_ns < static_cast<TimeNs>(1e9 * seconds); t_ns += kFrame) {
     ImuMotion motion;
     motion.duration = 1.0 / 30.0;
-    motion.R_BiBj = exp_so3(gyro * kTurnSigma * draw(3));
-    motion.p_BiBj = accel * kShiftSigma * draw(3);
+    const double turn =
+        rig.turn_rate * motion.duration * (rig.time_offset > 0.0 ? std::sin(1e-9 * static_cast<double>(t_ns)) : 1.0);
+    const Eigen::Matrix3d turned = exp_so3({turn, 0.0, 0.0});
+    motion.R_BiBj = turned * exp_so3(rig.gyro * kTurnSigma * draw(3));
+    motion.p_BiBj = rig.accel * kShiftSigma * draw(3);
     motion.covariance = Eigen::Matrix3d::Identity() * kShiftSigma * kShiftSigma;
     motion.turn_variance = kTurnSigma * kTurnSigma;
-    const Eigen::VectorXd off = L * draw(6) + bias / C(3, 3) * C.col(3);
+    const Eigen::VectorXd off = L * draw(6) + rig.shift / C(3, 3) * C.col(3);
     StereoMotion images;
-    images.R_B0B1 = exp_so3(off.head<3>());
+    images.R_B0B1 = turned * exp_so3({off(0), off(1), off(2) + rig.gyro_bias * motion.duration});
     images.p_B0B1 = off.tail<3>();
     images.covariance = C;
     images.matches = images.fitting = 100;
-    score.add(motion, images, P, t_ns);
+    const std::optional<Innovation> excess = judged.score.add(motion, images, P, t_ns);
+    REQUIRE(excess);
+    ++(excess->fits ? judged.fit : judged.unfit);
   }
-  return score;
+  return judged;
+}
+
+ImuScore score_after(double seconds, double gyro, double accel, double shift, unsigned seed) {
+  Rig rig;
+  rig.gyro = gyro;
+  rig.accel = accel;
+  rig.shift = shift;
+  return judged_after(seconds, rig, seed).score;
 }
 
 }  // namespace
@@ -99,12 +130,35 @@ TEST_CASE("imu score: one image that is wrong changes little, and those in which
   images.matches = 100;
   images.fitting = 80;
   const double before = gyro_score(score);
-  score.add(motion, images, P, 10 * 1'000'000'000LL);
+  (void)score.add(motion, images, P, 10 * 1'000'000'000LL);
   CHECK(gyro_score(score) == before);
   images.fitting = 100;
-  score.add(motion, images, P, 10 * 1'000'000'000LL);
+  (void)score.add(motion, images, P, 10 * 1'000'000'000LL);
   CHECK(gyro_score(score) < before);
   CHECK(gyro_score(score) > 0.5);
+}
+
+TEST_CASE("imu score: a bias of the gyroscope that no single image shows is found in half a second") {
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    CAPTURE(seed);
+    CHECK(judged_after(60.0, {}, seed).unfit == 0);
+    Rig biased;
+    biased.gyro_bias = 0.01;  // three standard deviations of a frame
+    CHECK(judged_after(0.5, biased, seed).unfit > 5);
+    CHECK(judged_after(10.0, biased, seed).fit < 10);
+  }
+}
+
+TEST_CASE("imu score: nor is it a fault what the cameras' mounting and time offset make of a turn") {
+  Rig turning;
+  turning.gyro_bias = 0.01;
+  turning.turn_rate = 1.0;
+  CHECK(judged_after(10.0, turning, 1).unfit > 200);
+  Rig mounted = turning;
+  mounted.mounting = 0.01;
+  CHECK(judged_after(10.0, mounted, 1).unfit == 0);
+  turning.time_offset = 0.02;  // the rate changes by up to 1 rad/s^2
+  CHECK(judged_after(1.0, turning, 1).unfit == 0);
 }
 
 TEST_CASE("imu score: what the samples show at rest is the noise that innovations are compared with") {

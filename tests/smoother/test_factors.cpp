@@ -2,7 +2,6 @@
 
 #include <vector>
 
-#include "filter/sources/wheels/wheel_displacement.h"
 #include "smoother/feature_factor.h"
 #include "smoother/standstill_factor.h"
 #include "smoother/wheel_factor.h"

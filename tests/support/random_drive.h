@@ -5,7 +5,7 @@
 #include <random>
 #include <vector>
 
-#include "filter/sources/wheels/wheel_preintegration.h"
+#include "smoother/wheel_preintegration.h"
 #include "tests/support/random_state.h"
 
 namespace ear::test {
@@ -39,10 +39,11 @@ struct NormalSighting {
   double sigma = 0.0;  ///< [rad]
 };
 
-inline WheelDisplacement preintegrate(const std::vector<WheelInterval>& intervals, const WheelModel& wheels,
-                                      const WheelNoise& noise, const Eigen::Vector3d& n_Bi, const Eigen::Vector3d& b_g,
-                                      const NormalSighting* sighting = nullptr) {
-  WheelPreintegration integration(wheels, noise);
+inline smoother::WheelDisplacement preintegrate(const std::vector<WheelInterval>& intervals,
+                                                const smoother::WheelModel& wheels, const smoother::WheelNoise& noise,
+                                                const Eigen::Vector3d& n_Bi, const Eigen::Vector3d& b_g,
+                                                const NormalSighting* sighting = nullptr) {
+  smoother::WheelPreintegration integration(wheels, noise);
   integration.start(n_Bi, b_g);
   for (std::size_t i = 0; i < intervals.size(); ++i) {
     if (sighting != nullptr && sighting->before == i) integration.set_normal(sighting->n_Bk, sighting->sigma);

@@ -30,7 +30,7 @@ LAYERS = {
     "filter/ekf/records.h": ["include/ear/", "eigen", "freestanding"],
     "filter/sources/": [*SOURCES, *BELOW_SOURCES, "filter/advice.h"],
     "filter/sources/cameras/": ["filter/sources/cameras/", "filter/sources/cameras/frame_agreement.h", *BELOW_SOURCES],
-    "filter/sources/cameras/frame_agreement.h": ["eigen"],
+    "filter/sources/cameras/frame_agreement.h": [],
     "filter/sources/wheels/": ["filter/sources/wheels/", *BELOW_SOURCES],
     "filter/sources/ground/": ["filter/sources/ground/", *BELOW_SOURCES],
     "filter/sources/standstill/": ["filter/sources/standstill/", *BELOW_SOURCES],

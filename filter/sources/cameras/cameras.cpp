@@ -12,11 +12,9 @@ namespace ear {
 namespace {
 
 constexpr double kBridgePosition = 5e-3;  // [m] chosen, as kSeenTurn: well above what the features will show later
-constexpr double kApparent = 3.0;       // chosen: standard deviations of the cameras' calibration that look like a turn
-constexpr double kLooser = 4.0;         // chosen: a distance may be wrong by so much more before it looks like a turn
-constexpr double kComparedStep = 1e-4;  // [rad, m] chosen: a tenth of what two images show
-constexpr double kRecent = 0.3;         // [s] chosen: an image shows the motion for so long
-constexpr double kNoisy = 1.25;         // chosen: times the usual noise of a feature; less may be chance
+constexpr double kComparedStep = 1e-4;    // [rad, m] chosen: a tenth of what two images show
+constexpr double kRecent = 0.3;           // [s] chosen: an image shows the motion for so long
+constexpr double kNoisy = 1.25;           // chosen: times the usual noise of a feature; less may be chance
 
 }  // namespace
 
@@ -111,18 +109,6 @@ bool Cameras::bridge(const FeatureFrame& frame, Ekf& ekf) {
   return true;
 }
 
-/// How fast the errors of the cameras' mounting, focal length and time offset make the vehicle seem to turn otherwise
-/// than the gyroscope measures, with the last image `dt` ago [rad/s].
-double Cameras::apparent_rate(double dt, const Ekf& ekf) const {
-  const auto P = ekf.covariance().matrix();
-  const double mounting = P.diagonal().segment<3>(err::camera).cwiseMax(0.0).maxCoeff();
-  const double focal = std::max(0.0, P(err::lens(0), err::lens(0)));
-  const double offset = std::max(0.0, P(err::time_offset, err::time_offset));
-  const Eigen::Vector3d& rate_B = ekf.rate_B();
-  const double acceleration = (rate_B - last_->rate_B).norm() / dt;
-  return kApparent * std::sqrt(rate_B.squaredNorm() * (mounting + focal) + acceleration * acceleration * offset);
-}
-
 FrameAgreement Cameras::compare(const FeatureFrame& frame, const Ekf& ekf) {
   FrameAgreement agreement;
   compared_.agrees = true;
@@ -135,13 +121,6 @@ FrameAgreement Cameras::compare(const FeatureFrame& frame, const Ekf& ekf) {
     const double sigma_p = dt * sigma_v;
     agreement = frame_check_.compare(matches_with(frame, x.camera), {moved.R, moved.p, sigma_p}, x.camera, noise_);
     compared_.agrees = !agreement.contradicts();
-    if (compared_.seen) {
-      const Eigen::Matrix3d loose = Eigen::Matrix3d::Identity() * std::pow(kLooser * sigma_p, 2);
-      const ExcessTurn turn = turn_beyond(*compared_.seen, moved.R, moved.p, loose);
-      agreement.turn = turn.value;
-      agreement.turn_known = true;
-    }
-    agreement.apparent_rate = apparent_rate(dt, ekf);
   }
   agreement.noise = noise_;
   agreement.behind = frame_check_.share_behind(frame, x.camera, noise_);
@@ -172,7 +151,7 @@ void Cameras::marginalise(std::optional<std::size_t> clone, Ekf& ekf) {
 
 void Cameras::remember(const FeatureFrame& frame, const Ekf& ekf) {
   const State& x = ekf.state();
-  last_ = LastImage{frame.t_ns, {x.imu.R_WB, x.imu.p_WB}, std::nullopt, {}, ekf.rate_B()};
+  last_ = LastImage{frame.t_ns, {x.imu.R_WB, x.imu.p_WB}, std::nullopt, {}};
   last_features_ = frame;
   if (x.clones.empty()) return;
   const Clone& clone = x.clones.back();

@@ -21,11 +21,10 @@ namespace ear {
 
 /// The last image that was used.
 struct LastImage {
-  TimeNs t_ns = 0;                                   ///< its camera stamp
-  Pose T_WB;                                         ///< the body then, as it was estimated then
-  std::optional<std::uint64_t> clone;                ///< Clone::frame of the newest clone then
-  Pose in_clone;                                     ///< the body then, in that clone
-  Eigen::Vector3d rate_B = Eigen::Vector3d::Zero();  ///< its rate then [rad/s]
+  TimeNs t_ns = 0;                     ///< its camera stamp
+  Pose T_WB;                           ///< the body then, as it was estimated then
+  std::optional<std::uint64_t> clone;  ///< Clone::frame of the newest clone then
+  Pose in_clone;                       ///< the body then, in that clone
 };
 
 class Cameras {
@@ -86,7 +85,6 @@ class Cameras {
   [[nodiscard]] Pose motion_since_image(const State& x) const;
   /// Of the last image that was used with the frame at hand.
   const std::vector<StereoMatch>& matches_with(const FeatureFrame& frame, const CameraState& cameras);
-  [[nodiscard]] double apparent_rate(double dt, const Ekf& ekf) const;
   void marginalise(std::optional<std::size_t> clone, Ekf& ekf);
 
   FilterConfig config_;

@@ -3,6 +3,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <complex>
 
 #include "filter/ekf/state.h"
 #include "filter/ingest/evidence.h"
@@ -11,13 +12,9 @@
 
 namespace ear {
 
-MountingWatch::Gained& MountingWatch::Gained::add(const Gained& other, double weight) {
-  inertial += weight * other.inertial;
-  for (std::size_t i = 0; i < 2; ++i) {
-    wheels[i] += weight * other.wheels[i];
-    rates[i] += weight * other.rates[i];
-  }
-  return *this;
+void MountingWatch::Products::add(const Motion& change, double kept) {
+  sum = kept * sum + change * change.transpose();
+  count = kept * count + 1.0;
 }
 
 MountingWatch::MountingWatch(const OdometerConfig& config, const EncoderCalibration& encoder)
@@ -31,7 +28,7 @@ void MountingWatch::restart(TimeNs t_ns, const Eigen::Vector3d& up_B) {
   end_ns_ = t_ns;
   up_O_ = R_OB_ * up_B;
   duration_ = 0.0;
-  gained_ = sum_ = Gained{};
+  gained_ = sum_ = Motion::Zero();
   windows_ = 0;
 }
 
@@ -52,44 +49,33 @@ void MountingWatch::add(const WheelIncrement& increment, const ImuBuffer& imu, c
                      });
   const double pitch = config_.model == OdometerModel::terrain ? turn.y() : 0.0;  // (5)
   const double speed = radius_ * (increment.angle.mean() + pitch) / dt;
-  Gained change;
-  change.inertial = {force.x(), force.y()};
-  change.wheels[1] = turn.z() * speed;
   const Eigen::Vector3d lever = (turn / dt).cross(p_OB_);
-  Gained now = gained_;  // in the middle
-  now.add(change, 0.5);
-  now.inertial -= std::complex<double>(lever.x(), lever.y());
-  now.wheels[0] = speed;
-  now.rates = {radius_ * (increment.angle(1) - increment.angle(0)) / track_width_ / dt, turn.z() / dt};
-  gained_.add(change, 1.0);
-  sum_.add(now, dt);
+  Motion change = Motion::Zero();
+  change.head<2>() = force.head<2>();
+  change(wheels_left) = turn.z() * speed;
+  Motion now = gained_ + 0.5 * change;  // in the middle
+  now.head<2>() -= lever.head<2>();
+  now(wheels_ahead) = speed;
+  now(wheels_turn) = radius_ * (increment.angle(1) - increment.angle(0)) / track_width_ / dt;
+  now(gyro_turn) = turn.z() / dt;
+  gained_ += change;
+  sum_ += dt * now;
   duration_ += dt;
   if (duration_ >= 2.0 * kStreamGap) close_window();
 }
 
 /// How the mean velocity changed from window to window, less how it changed before: a tilt that stays drops out.
 void MountingWatch::close_window() {
-  Gained mean;
-  mean.add(sum_, 1.0 / duration_);
-  Gained change = mean;
-  change.add(means_[1], -2.0).add(means_[0], 1.0);
+  const Motion mean = sum_ / duration_;
+  const Motion change = mean - 2.0 * means_[1] + means_[0];
   const double kept = std::exp(-duration_ / kSlopeMemory);
-  if (windows_ >= 2 && std::hypot(change.wheels[0], change.wheels[1]) > config_.speed_sigma) {
-    const Eigen::Vector2cd x(change.wheels[0], std::complex<double>(0.0, change.wheels[1]));
-    Regression& r = regression_;
-    r.xx = kept * r.xx + x.conjugate() * x.transpose();
-    r.xy = kept * r.xy + x.conjugate() * change.inertial;
-    r.yy = kept * r.yy + std::norm(change.inertial);
-    r.count = kept * r.count + 1.0;
-  }
   if (windows_ >= 2) {
-    const double w = change.rates[0], g = change.rates[1];
-    Turns& t = turns_;
-    t = {kept * t.gg + g * g, kept * t.gw + g * w, kept * t.ww + w * w, kept * t.count + 1.0};
+    turned_.add(change, kept);
+    if (std::hypot(change(wheels_ahead), change(wheels_left)) > config_.speed_sigma) moved_.add(change, kept);
   }
   means_ = {means_[1], mean};
   ++windows_;
-  sum_ = Gained{};
+  sum_.setZero();
   duration_ = 0.0;
   contradicts_ = forwards_apart() || turns_apart();
 }
@@ -97,13 +83,19 @@ void MountingWatch::close_window() {
 /// Slopes are 1 where all is well, and less where wheels slip, but never backwards. Half of it or more to a side: axes
 /// are exchanged.
 bool MountingWatch::forwards_apart() const {
-  const Regression& r = regression_;
-  if (r.count < kToKnow) return false;
-  // What never changed is not known: its slope has the standard deviation that so little gives.
+  if (moved_.count < kToKnow) return false;
+  // A velocity is ahead + i left: least squares over the slopes of the inertial one on the wheels' two parts. What
+  // never changed is not known: its slope has the standard deviation that so little gives.
+  Eigen::Matrix<std::complex<double>, 6, 3> parts = Eigen::Matrix<std::complex<double>, 6, 3>::Zero();
+  parts(wheels_ahead, 0) = parts(inertial_ahead, 2) = 1.0;
+  parts(wheels_left, 1) = parts(inertial_left, 2) = {0.0, 1.0};
+  const Eigen::Matrix3cd products = parts.adjoint() * moved_.sum * parts;
   const double least = config_.speed_sigma * config_.speed_sigma;
-  const Eigen::Matrix2cd inverse = (r.xx + least * Eigen::Matrix2cd::Identity()).inverse();
-  const Eigen::Vector2cd slopes = inverse * r.xy;
-  const double variance = std::max(0.0, r.yy - r.xy.dot(slopes).real()) / (2.0 * (r.count - 2.0));
+  const Eigen::Matrix2cd inverse = (products.topLeftCorner<2, 2>() + least * Eigen::Matrix2cd::Identity()).inverse();
+  const Eigen::Vector2cd xy = products.topRightCorner<2, 1>();
+  const Eigen::Vector2cd slopes = inverse * xy;
+  const double left_over = products(2, 2).real() - xy.dot(slopes).real();
+  const double variance = std::max(0.0, left_over) / (2.0 * (moved_.count - 2.0));
   for (Eigen::Index i = 0; i < 2; ++i) {
     const std::complex<double> slope = slopes(i);
     const double doubt = kClear * std::sqrt(variance * inverse(i, i).real());
@@ -115,11 +107,12 @@ bool MountingWatch::forwards_apart() const {
 /// The slope of the wheels' turns on the gyroscope's: wheels that scrub turn more, never against it. Radii and bias
 /// that are a little wrong make a turn in every window, of the size that the yaw rate's noise has.
 bool MountingWatch::turns_apart() const {
-  const Turns& t = turns_;
-  if (t.count < kToKnow || t.gg <= 0.0) return false;
-  const double slope = t.gw / t.gg;
-  const double sigma = std::sqrt(std::max(0.0, t.ww - slope * t.gw) / (t.count - 1.0) / t.gg);
-  const double noise = config_.yaw_rate_sigma * std::sqrt(t.count / t.gg);  // at worst, always the same way
+  const double gg = turned_.sum(gyro_turn, gyro_turn), gw = turned_.sum(gyro_turn, wheels_turn);
+  const double ww = turned_.sum(wheels_turn, wheels_turn);
+  if (turned_.count < kToKnow || gg <= 0.0) return false;
+  const double slope = gw / gg;
+  const double sigma = std::sqrt(std::max(0.0, ww - slope * gw) / (turned_.count - 1.0) / gg);
+  const double noise = config_.yaw_rate_sigma * std::sqrt(turned_.count / gg);  // at worst, always the same way
   return slope + kClear * sigma + noise < 0.0;
 }
 

@@ -4,7 +4,6 @@
 
 #include <Eigen/Core>
 #include <array>
-#include <complex>
 #include <cstddef>
 
 #include "ear/calibration.h"
@@ -27,22 +26,16 @@ class MountingWatch {
   [[nodiscard]] bool contradicts() const { return contradicts_; }
 
  private:
-  /// Horizontal velocity that was gained since the last gap [m/s], forward and left, and yaw rates [rad/s].
-  struct Gained {
-    std::complex<double> inertial;   ///< by the specific force, at the axle
-    std::array<double, 2> wheels{};  ///< by the wheels: forward; left, for a yaw rate of the gyroscope
-    std::array<double, 2> rates{};   ///< by the wheels; by the gyroscope
-    Gained& add(const Gained& other, double weight);
-  };
-  /// Sums over windows, in which something changed: inertial = forward x0 + left x1.
-  struct Regression {
-    Eigen::Matrix2cd xx = Eigen::Matrix2cd::Zero();
-    Eigen::Vector2cd xy = Eigen::Vector2cd::Zero();
-    double yy = 0.0, count = 0.0;
-  };
-  /// Sums over the same windows of how the yaw rates by the wheels (w) and by the gyroscope (g) changed.
-  struct Turns {
-    double gg = 0.0, gw = 0.0, ww = 0.0, count = 0.0;
+  /// What is compared: horizontal velocity that was gained since the last gap [m/s], by the specific force, at the
+  /// axle, and by the wheels, there to the left for a yaw rate of the gyroscope; yaw rates by wheels and gyroscope
+  /// [rad/s].
+  using Motion = Eigen::Matrix<double, 6, 1>;
+  enum Entry : int { inertial_ahead, inertial_left, wheels_ahead, wheels_left, wheels_turn, gyro_turn };
+  /// Sums over windows of the products of how it changed.
+  struct Products {
+    Eigen::Matrix<double, 6, 6> sum = Eigen::Matrix<double, 6, 6>::Zero();
+    double count = 0.0;
+    void add(const Motion& change, double kept);
   };
 
   void restart(TimeNs t_ns, const Eigen::Vector3d& up_B);
@@ -56,12 +49,12 @@ class MountingWatch {
   Eigen::Vector3d p_OB_;                             ///< the inertial sensors in the odometer's frame [m]
   Eigen::Vector3d up_O_ = Eigen::Vector3d::UnitZ();  ///< as the gyroscope turns it: the state's would be made to fit
   TimeNs end_ns_ = 0;
-  double duration_ = 0.0;        ///< [s] of the window at hand
-  Gained gained_, sum_;          ///< up to now; integral over the window
-  std::array<Gained, 2> means_;  ///< over the two windows before
-  int windows_ = 0;              ///< since the last gap
-  Regression regression_;
-  Turns turns_;
+  double duration_ = 0.0;                                                      ///< [s] of the window at hand
+  Motion gained_ = Motion::Zero(), sum_ = Motion::Zero();                      ///< up to now; integral over the window
+  std::array<Motion, 2> means_{Motion::Zero().eval(), Motion::Zero().eval()};  ///< over the two windows before
+  int windows_ = 0;                                                            ///< since the last gap
+  Products moved_;   ///< of windows in which the velocity changed
+  Products turned_;  ///< of all
   bool contradicts_ = false;
 };
 

@@ -51,17 +51,16 @@ WheelRows linearize_wheels(const State& x, const Eigen::Matrix3d& R_WB, const Ei
   const Eigen::Matrix<double, 3, 2> f_delta = unit * skew(y) * n_delta;
 
   // How the predictions move with v_O (by nu and by the rate), then with the directions, then with the wheels.
-  Eigen::Matrix<double, 3, 3> direction;
-  direction << f.transpose(), y.transpose(), n.transpose();
+  rows.direction << f.transpose(), y.transpose(), n.transpose();
   const Eigen::Matrix3d v_rate = -skew(odometer.T_BO.p);
-  rows.J_gyro.topRows<3>() = direction * v_rate;
+  rows.J_gyro.topRows<3>() = rows.direction * v_rate;
   rows.J_gyro.row(WheelRows::yaw_rate) = n.transpose();
   if (terrain) rows.J_gyro.row(WheelRows::speed) -= r * y.transpose();
 
   auto& H = rows.H;
-  H.middleCols<3>(nu).topRows<3>() = direction * R_WB.transpose();
+  H.middleCols<3>(nu).topRows<3>() = rows.direction * R_WB.transpose();
   H.middleCols<3>(b_g) = -rows.J_gyro;
-  H.middleCols<3>(axle).topRows<3>() = direction * skew(rate);
+  H.middleCols<3>(axle).topRows<3>() = rows.direction * skew(rate);
   H.block<1, 3>(WheelRows::speed, phi) = v_O.transpose() * f_phi;
   H.block<1, 3>(WheelRows::side, phi) = v_O.transpose() * y_phi;
   H.block<1, 3>(WheelRows::slope, phi) = v_O.transpose() * n_phi;

@@ -21,6 +21,7 @@ struct WheelRows {
   Eigen::Matrix<double, size, 1> residual;
   Eigen::Matrix<double, size, kGroundColumns> H = Eigen::Matrix<double, size, kGroundColumns>::Zero();
   Eigen::Matrix<double, size, 3> J_gyro;  ///< of the prediction by the measured rate
+  Eigen::Matrix3d direction;              ///< of speed, side and slope, in B
   double wheel_speed = 0.0;               ///< forward speed that the wheels measure [m/s]
 
   /// In place of the axle's middle, the speed is measured at this place on the axle, by the wheels and the gyroscope's

@@ -1,10 +1,10 @@
 #include "filter/sources/wheels/wheels.h"
 
+#include <Eigen/LU>
 #include <cmath>
 #include <initializer_list>
 
 #include "filter/ekf/propagation.h"
-#include "filter/sources/wheels/wheel_displacement.h"
 
 namespace ear {
 namespace {
@@ -126,12 +126,39 @@ void Wheels::score_wheels(WheelRows& rows, Sigmas& sigma, TimeNs t_ns, const Con
       std::hypot(sigma(WheelRows::speed), lever * sigma(WheelRows::yaw_rate)) * std::sqrt(2.0 / sum);
 }
 
+/// The rows are those of one long increment: the velocity at its middle with which they all predict zero. Their
+/// derivatives are taken there.
 Displacement Wheels::displacement(const Ekf& ekf, const WheelIncrements& increments, const ImuBuffer& imu, TimeNs to_ns,
                                   bool ground_known) const {
-  if (uses_plane() && !ground_known) return {};
-  const WheelSetting setting{wheel_noise(config_, encoder_, imu_), config_.speed_sigma, config_.side_slip_turn,
-                             uses_plane()};
-  return wheel_displacement(ekf.state(), ekf.covariance(), increments, imu, to_ns, setting);
+  Displacement result;
+  const State& x = ekf.state();
+  WheelIncrement whole{x.imu.t_ns, to_ns};
+  const bool complete = for_each_part(increments, whole.from_ns, to_ns, [&](const IncrementPart& part) {
+    whole.angle += part.angle;
+    return true;
+  });
+  if (!complete || to_ns <= whole.from_ns || (uses_plane() && !ground_known)) return result;
+  const double dt = whole.duration();
+  const MeanRate rate = imu.mean_rate(whole.from_ns, to_ns);
+  const Eigen::Matrix3d R_half = exp_so3(0.5 * dt * (rate.gyro_B - x.imu.b_g));
+  const Eigen::Matrix3d R_WB = x.imu.R_WB * R_half;
+  const auto rows_at = [&](const Eigen::Vector3d& v_B) {
+    return linearize_wheels(x, R_WB, R_WB * v_B, whole, rate.gyro_B, config_.model, sees_ground_);
+  };
+  WheelRows rows = rows_at(Eigen::Vector3d::Zero());
+  const Eigen::Matrix3d by_rows = rows.direction.inverse();
+  const Eigen::Vector3d v_B = by_rows * rows.residual.head<3>();
+  rows = rows_at(v_B);
+  Eigen::Matrix<double, 3, kGroundColumns> H = rows.H.topRows<3>();
+  H.middleCols<3>(ground_column(err::nu)).setZero();  // the velocity is what they show
+  Eigen::Matrix3d covariance =
+      H * ekf.covariance().matrix().block<kGroundColumns, kGroundColumns>(err::nu, err::nu) * H.transpose();
+  covariance.diagonal() += noise_of(rows, whole, rate, x).head<3>().cwiseAbs2();
+  const Eigen::Matrix3d J = dt * R_half * by_rows;
+  result.p_BiBj = dt * R_half * v_B;
+  result.covariance = J * covariance * J.transpose();
+  result.available = result.p_BiBj.allFinite() && result.covariance.allFinite();
+  return result;
 }
 
 bool Wheels::lifting(TimeNs t_ns) const {

@@ -6,12 +6,13 @@
 #include <vector>
 
 #include "filter/ekf/so3.h"
-#include "filter/sources/wheels/wheel_preintegration.h"
+#include "smoother/wheel_preintegration.h"
 #include "tests/support/check_jacobian.h"
 #include "tests/support/random_drive.h"
 #include "tests/support/random_state.h"
 
 using namespace ear;
+using namespace ear::smoother;
 using namespace ear::test;
 
 namespace {

@@ -8,10 +8,11 @@
 #include <vector>
 
 #include "filter/ingest/imu_buffer.h"
-#include "filter/sources/wheels/wheel_preintegration.h"
+#include "smoother/wheel_preintegration.h"
 #include "tools/simulator/simulation.h"
 
 using namespace ear;
+using namespace ear::smoother;
 
 namespace {
 

@@ -1,5 +1,5 @@
 // The displacement of the axle's middle O between two instants i and j, from wheels, gyroscope and the ground's normal:
-// the paper's pre-integration, (9)-(11). Derivation: docs/filter.md, "Pre-integration".
+// the paper's pre-integration, (9)-(11). Derivation: docs/smoother.md, "Pre-integration".
 //
 //   alpha = sum over encoder intervals k of R_BiBk f_k s_k dt
 //   s_k dt = mean over both wheels of radius * (turn relative to the body + turn of the body about the axle)
@@ -10,7 +10,11 @@
 
 #include <Eigen/Core>
 
-namespace ear {
+#include "ear/calibration.h"
+#include "ear/filter_config.h"
+#include "filter/ekf/state.h"
+
+namespace ear::smoother {
 
 /// Two wheels on one axle, as (9) sees them.
 struct WheelModel {
@@ -28,6 +32,13 @@ struct WheelNoise {
   double roughness = 0.0;    ///< through the ground [m/sqrt(m)]
   double normal_walk = 0.0;  ///< how the ground's normal turns, each axis [rad/sqrt(m)]
 };
+
+/// The wheels as the estimator knows them.
+[[nodiscard]] WheelModel wheel_model(const OdometerState& odometer);
+
+/// The wheels' noise by the settings and the calibration.
+[[nodiscard]] WheelNoise wheel_noise(const OdometerConfig& odometer, const EncoderCalibration& encoder,
+                                     const ImuCalibration& imu);
 
 /// The displacement with its covariance, what it was computed with, and its derivatives by that. Vectors are in B_i.
 struct WheelDisplacement {
@@ -91,4 +102,4 @@ class WheelPreintegration {
   bool usable_ = true;
 };
 
-}  // namespace ear
+}  // namespace ear::smoother

@@ -1,11 +1,11 @@
-#include "filter/sources/wheels/wheel_preintegration.h"
+#include "smoother/wheel_preintegration.h"
 
 #include <cassert>
 #include <cmath>
 
 #include "filter/ekf/so3.h"
 
-namespace ear {
+namespace ear::smoother {
 namespace {
 
 // Chosen: sine of the angle between axle and normal: below it, the vehicle lies on its side.
@@ -61,6 +61,25 @@ Advance advance_of_middle(const Eigen::Vector2d& rolled, double climb) {
 }
 
 }  // namespace
+
+WheelModel wheel_model(const OdometerState& odometer) {
+  WheelModel wheels;
+  wheels.radius = odometer.wheel_radius;
+  wheels.track_width = odometer.track_width;
+  wheels.y_B = odometer.T_BO.R.col(1);
+  return wheels;
+}
+
+WheelNoise wheel_noise(const OdometerConfig& odometer, const EncoderCalibration& encoder, const ImuCalibration& imu) {
+  WheelNoise noise;
+  noise.gyro = imu.gyro_noise;
+  noise.reading = encoder.noise_counts * 2.0 * M_PI / static_cast<double>(encoder.resolution);
+  noise.slip = odometer.slip;
+  noise.side_slip = odometer.side_slip;
+  noise.roughness = odometer.roughness;
+  noise.normal_walk = odometer.normal_walk;
+  return noise;
+}
 
 void WheelPreintegration::start(const Eigen::Vector3d& n_Bi, const Eigen::Vector3d& b_g) {
   *this = WheelPreintegration(wheels_, noise_);
@@ -172,4 +191,4 @@ WheelDisplacement WheelPreintegration::result() const {
   return z;
 }
 
-}  // namespace ear
+}  // namespace ear::smoother
