@@ -63,7 +63,8 @@ void Filter::propagate_to(const FeatureFrame& frame) {
 /// A bias that jumped took the motion along until it was found out, for as long as the watch remembers. Both are less
 /// well known by what was observed. By wheels alone it looks the same as a wheel that slips.
 void Filter::watch_biases() {
-  if (!sources_.cameras().show_motion(ekf_.state())) ekf_.discard_bias_changes();
+  const bool by_wheels_alone = sources_.uses_wheels() && !sources_.cameras().show_motion(ekf_.state());
+  if (by_wheels_alone) ekf_.discard_bias_changes();
   const TimeNs t_ns = ekf_.state().imu.t_ns;
   const BiasJump jump = bias_watch_.judge(ekf_.take_bias_changes(), t_ns);
   if (!jump.any()) return;
