@@ -11,6 +11,7 @@ namespace ear {
 namespace {
 
 constexpr std::size_t kMinCommonFeatures = 8;  // chosen: fewer do not set motion apart from mismatches
+constexpr double kNoRest = 0.05;               // [s] chosen: wheels that turned so lately turn
 constexpr double kWheelPlay = 0.005;           // [rad] chosen: that a wheel at rest may turn: 0.4 mm of its rim
 
 }  // namespace
@@ -45,13 +46,13 @@ bool StandstillDetector::update(const FeatureFrame& frame, const ImuStatistics& 
   const double max_flow_px = standing_ ? config_.leave_flow_px : config_.max_flow_px;
   const std::optional<double> flow_px = common_flow_px(frame);
   const bool known = flow_px || wheel_rest;
-  if (!imu_quiet || !since_ns_ || !known || flow_px > max_flow_px) {
+  const bool moved = (flow_px && *flow_px > max_flow_px) || (wheel_rest && *wheel_rest < kNoRest);
+  if (!imu_quiet || !since_ns_ || !known || moved) {
     restart(frame);
     return false;
   }
   const bool enough_imu = imu.duration > 0.8 * config_.duration;
-  const bool wheels_rest = wheel_rest.value_or(config_.duration) >= config_.duration;
-  standing_ = enough_imu && wheels_rest && seconds_between(*since_ns_, frame.t_ns) >= config_.duration;
+  standing_ = enough_imu && seconds_between(*since_ns_, frame.t_ns) >= config_.duration;
   if (standing_ && !frame.features.empty()) renew_reference(frame);
   return standing_;
 }
