@@ -30,6 +30,8 @@ std::optional<Innovation> ImuScore::add_excess(const ExcessTurn& turn, const Imu
                                                TimeNs t_ns) {
   Excess& e = excess_;
   const double dt = motion.duration;
+  if (!turn.value.allFinite() || !turn.covariance.allFinite() || !P.matrix().diagonal().allFinite())
+    return std::nullopt;
   const double since = e.last_ns ? seconds_between(*e.last_ns, t_ns) : kStale;
   const auto variance = [&P](int entry) { return std::max(0.0, P.matrix()(entry, entry)); };
   const double mounting = P.matrix().diagonal().segment<3>(err::camera).cwiseMax(0.0).maxCoeff();
