@@ -116,7 +116,15 @@ void HealthMonitor::add_frame(const Frame& frame, const std::array<SourceRecord,
     last_.statistics.stereo = before.statistics.stereo;
     last_.agreement = before.agreement;
   }
-  hold_wheels(before.statistics);
+  // Wheels that are slower than the frames: what their last readings showed holds until the next are due.
+  FrameStatistics& now = last_.statistics;
+  if (now.wheel_rows_used + now.wheel_rows_rejected > 0) {
+    arrivals_.wheel_rows_ns = t_ns;
+  } else if (now.on_ground &&
+             seconds_between(arrivals_.wheel_rows_ns, t_ns) < longest_silence(arrivals_.encoder_interval)) {
+    now.wheel_rows_used = before.statistics.wheel_rows_used;
+    now.wheel_rows_rejected = before.statistics.wheel_rows_rejected;
+  }
   arrivals_.refused_imu_ns.reset();
   if (frame.image)
     images_.add({t_ns, arrivals_.imu_ns.value_or(t_ns), frame.running, frame.agreement, frame.statistics});
@@ -131,18 +139,6 @@ void HealthMonitor::add_frame(const Frame& frame, const std::array<SourceRecord,
   health_.vertical_sigma = frame.vertical_sigma;
   decide(t_ns);
   health_.quality = quality(last_);
-}
-
-/// Wheels that are slower than the frames: what their last readings showed holds until the next are due.
-void HealthMonitor::hold_wheels(const FrameStatistics& before) {
-  FrameStatistics& now = last_.statistics;
-  if (now.wheel_rows_used + now.wheel_rows_rejected > 0) {
-    arrivals_.wheel_rows_ns = last_.t_ns;
-  } else if (now.on_ground &&
-             seconds_between(arrivals_.wheel_rows_ns, last_.t_ns) < longest_silence(arrivals_.encoder_interval)) {
-    now.wheel_rows_used = before.wheel_rows_used;
-    now.wheel_rows_rejected = before.wheel_rows_rejected;
-  }
 }
 
 /// Wheels and beams have something to show on the ground only.

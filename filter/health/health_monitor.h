@@ -76,7 +76,6 @@ class HealthMonitor {
  private:
   void judge_ground(const Frame& frame, const std::array<SourceRecord, kSourceCount>& records);
   void note_silence(TimeNs t_ns);
-  void hold_wheels(const FrameStatistics& before);
   void decide(TimeNs t_ns);
   [[nodiscard]] Reason reason(TimeNs t_ns) const;
   [[nodiscard]] bool wheels_carry(const FrameStatistics& frame) const;
