@@ -93,10 +93,10 @@ std::optional<TimeNs> Ekf::propagate(const ImuBuffer& samples, TimeNs t_ns, cons
         } else {
           total = step;
         }
-        turned_ += state_.imu.R_WB.row(2).dot(gyro_B - state_.imu.b_g) * dt;
+        rate_B_ = gyro_B - state_.imu.b_g;
+        turned_ += state_.imu.R_WB.row(2).dot(rate_B_) * dt;
         turned_path_ += turned_ * dt * state_.imu.v_W;
         state_.imu = integrate(state_.imu, gyro_B, accel_B, dt);
-        rate_B_ = gyro_B - state_.imu.b_g;
       });
   state_.imu.t_ns = t_ns;
   const double distance = state_.imu.v_W.norm() * duration;
