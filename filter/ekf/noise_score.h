@@ -26,15 +26,13 @@ class NoiseScore {
 
   /// What an innovation is compared with: the variances of its parts.
   struct Expected {
-    double state = 0.0;      ///< by the state's error
-    double noise = 0.0;      ///< by the sensor's noise, as it usually is
-    bool supported = false;  ///< other sensors show the same part of the state
-    bool adapts = true;      ///< false: the noise stays as it usually is
+    double state = 0.0;  ///< by the state's error
+    double noise = 0.0;  ///< by the sensor's noise, as it usually is
+    bool adapts = true;  ///< false: the noise stays as it usually is
   };
 
   /// A residual at `t_ns`. The factor, at least 1, that the noise's variance is to be multiplied by. What the state
-  /// contradicts weighs less and less: where the state is supported it counts for nothing in the end, by the square of
-  /// the believed factor; where it is not, the state may be what is wrong, and the factor itself leaves a pull that
+  /// contradicts weighs less and less, but never nothing: the state may be what is wrong, and the pull that is left
   /// brings it back.
   double add(double residual, const Expected& expected, TimeNs t_ns);
 

@@ -76,11 +76,10 @@ void Sources::advance(TimeNs t_ns, const Advice& advice, Ingest& ingest, Ekf& ek
     if (!z->increment) {
       ground_.update(z->ranges, ingest.imu(), camera_update_, ekf, records);
     } else if (on_ground() && ground_.rolls_at(z->increment->from_ns)) {
-      const bool supported = cameras_.show_motion(ekf.state());
-      wheels_->update(*z->increment,
-                      {ingest.imu(), ground_.known(), advice.of(MotionSensor::odometer), supported, camera_update_,
-                       imu_score_.noise().gyro},
-                      ekf, records);
+      wheels_->update(
+          *z->increment,
+          {ingest.imu(), ground_.known(), advice.of(MotionSensor::odometer), camera_update_, imu_score_.noise().gyro},
+          ekf, records);
     }
   }
   propagate(t_ns, advice, ingest, ekf);

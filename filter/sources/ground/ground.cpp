@@ -60,8 +60,7 @@ Innovation Ground::weigh(GroundRows<kMaxBeams + 1>& z, NoiseScore& score, TimeNs
   const int row = z.count++;
   Innovation innovation = ekf.test(z.H.row(row), z.residual(row), z.sigma(row));
   const double noise = z.sigma(row) * z.sigma(row);
-  z.sigma(row) *=
-      std::sqrt(score.add(innovation.value, {innovation.variance - noise, noise, false, config_.scores}, t_ns));
+  z.sigma(row) *= std::sqrt(score.add(innovation.value, {innovation.variance - noise, noise, config_.scores}, t_ns));
   innovation.score = score.weight();
   return innovation;
 }

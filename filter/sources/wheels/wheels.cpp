@@ -41,8 +41,8 @@ void Wheels::update(const WheelIncrement& increment, const Context& context, Ekf
       if (row == WheelRows::slope && !innovation.fits) running_.lifted_ns = increment.to_ns;
       NoiseScore& score = running_.row[static_cast<std::size_t>(row)];
       const double noise = sigma(row) * sigma(row);
-      sigma(row) *= std::sqrt(score.add(
-          innovation.value, {innovation.variance - noise, noise, context.supported, config_.scores}, increment.to_ns));
+      sigma(row) *=
+          std::sqrt(score.add(innovation.value, {innovation.variance - noise, noise, config_.scores}, increment.to_ns));
       count(score, records.statistics);
     }
     z.H.row(z.count) = rows.H.row(row);
@@ -112,8 +112,7 @@ void Wheels::score_wheels(WheelRows& rows, Sigmas& sigma, TimeNs t_ns, const Con
         ekf.test(H, rows.residual(WheelRows::speed) + side * rows.residual(WheelRows::yaw_rate), noise);
     NoiseScore& score = running_.wheel[i];
     information[i] =
-        1.0 / score.add(innovation.value,
-                        {innovation.variance - noise * noise, noise * noise, context.supported, config_.scores}, t_ns);
+        1.0 / score.add(innovation.value, {innovation.variance - noise * noise, noise * noise, config_.scores}, t_ns);
     innovation.fits = score.fits();
     innovation.score = context.weight * score.weight();
     records.log.add(i == 0 ? Source::wheel_left : Source::wheel_right, innovation, t_ns);

@@ -27,7 +27,6 @@ class Wheels {
     const ImuBuffer& imu;
     bool ground_known = false;  ///< the lasers have seen the ground since it was last touched
     double weight = 1.0;        ///< (15)
-    bool supported = false;     ///< images show how the vehicle moves too
     CameraUpdate calibration = CameraUpdate::considered;
     double gyro_noise = 1.0;  ///< times the stated one
   };
