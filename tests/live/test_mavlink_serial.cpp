@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <cmath>
 #include <cstdlib>
 #include <mutex>
 #include <random>
@@ -23,6 +24,8 @@ using namespace ear::live;
 namespace {
 
 using namespace std::chrono_literals;
+
+constexpr double kPerTick = 1e-6;  // [rad/s] of the gyroscope's x axis: so a sample can be told from the others
 
 /// A flight controller that stands. It started a thousand seconds ago, and its clock runs 100 ppm fast.
 class Board {
@@ -76,7 +79,7 @@ class Board {
         const std::lock_guard lock(mutex_);
         taken_.push_back(clock_.now());
       }
-      send(to_payload(mavlink::ImuMessage{stamp_us, {0.0, 0.0, 9.81}, {0.001 * (tick % 2), 0.0, 0.0}, 0}));
+      send(to_payload(mavlink::ImuMessage{stamp_us, {0.0, 0.0, 9.81}, {kPerTick * tick, 0.0, 0.0}, 0}));
       if (tick % 2 == 0) send(to_payload(mavlink::WheelDistance{stamp_us, {}, 2}));
       if (tick % 10 == 0) {
         for (const std::uint8_t id : {std::uint8_t{4}, std::uint8_t{7}})
@@ -115,6 +118,12 @@ class Board {
   std::thread thread_;
 };
 
+/// Of a sample: which one it is, and its time by our clock.
+struct Stamp {
+  std::size_t tick;
+  TimeNs t_ns;
+};
+
 /// What `ear live` has at the other end of the line.
 struct Ear {
   static Calibration calibration() {
@@ -135,7 +144,7 @@ struct Ear {
     IntakeTaps taps;
     taps.imu = [this](const ImuSample& sample, const std::optional<NavState>&) {
       const std::lock_guard lock(mutex);
-      imu.push_back(sample.t_ns);
+      imu.push_back({static_cast<std::size_t>(std::lround(sample.gyro_B.x() / kPerTick)), sample.t_ns});
     };
     taps.encoder = [this](const EncoderSample&) { ++wheels; };
     taps.laser = [this](const QueuedOdometry::Ranges& sample) {
@@ -166,14 +175,14 @@ struct Ear {
     return false;
   }
   [[nodiscard]] bool heard(const std::string& words) const { return said.find(words) != std::string::npos; }
-  [[nodiscard]] std::vector<TimeNs> stamps() {
+  [[nodiscard]] std::vector<Stamp> stamps() {
     const std::lock_guard lock(mutex);
     return imu;
   }
 
   LiveClock clock;
   std::mutex mutex;
-  std::vector<TimeNs> imu;
+  std::vector<Stamp> imu;
   std::atomic<int> wheels{0}, ranges{0};
   std::string said;
   std::atomic<MavlinkLines*> outputs{nullptr};
@@ -203,16 +212,16 @@ TEST_CASE("mavlink serial: samples of a board get our time by TIMESYNC, and odom
   CAPTURE(board.odometry());
   REQUIRE(all_came);
   CHECK(ear.heard("mavlink: the clocks are synchronised"));
-  const std::vector<TimeNs> stamps = ear.stamps(), taken = board.taken();
-  std::vector<double> off;  // of each stamp, from the nearest time at which a sample was taken
+  const std::vector<Stamp> stamps = ear.stamps();
+  const std::vector<TimeNs> taken = board.taken();
+  std::vector<double> off;
   for (std::size_t i = stamps.size() - 100; i < stamps.size(); ++i) {
-    const auto later = std::lower_bound(taken.begin() + 1, taken.end() - 1, stamps[i]);
-    off.push_back(
-        std::min(std::abs(seconds_between(*later, stamps[i])), std::abs(seconds_between(*(later - 1), stamps[i]))));
+    REQUIRE(stamps[i].tick < taken.size());
+    off.push_back(std::abs(seconds_between(taken[stamps[i].tick], stamps[i].t_ns)));
   }
   std::sort(off.begin(), off.end());
   MESSAGE("stamps are off by ", 1e3 * off[50], " ms in the median, ", 1e3 * off[99], " ms at most");
-  CHECK(off[50] < 1e-3);  // samples are 5 ms apart
+  CHECK(off[50] < 0.02);  // a busy machine answers late; the clocks are 1000 s apart
 }
 
 TEST_CASE("mavlink serial: a board that does not answer, and one that starts again, are named") {
