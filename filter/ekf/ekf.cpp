@@ -42,19 +42,17 @@ void Ekf::start(const ImuState& x, const Eigen::VectorXd& sigma, bool scale_is_g
 /// Calibration by a target shows how far away things are, the product of focal length and baseline, better than either:
 /// by as much as the mean focal length is too large, the baseline is too short.
 void Ekf::correlate_baseline_and_lenses(const Eigen::VectorXd& sigma) {
-  constexpr int kFirst = err::stereo + 3;
-  constexpr int kCount = err::lens(1) + 1 - kFirst;
-  if (!(sigma(kFirst) > 0.0)) return;
+  if (!(sigma(err::baseline) > 0.0)) return;
   const Eigen::Vector3d shorter = -0.5 * state_.camera.T_C0C1.p;  // per relative error of one focal length
-  Eigen::Matrix<double, kCount, kCount> added = Eigen::Matrix<double, kCount, kCount>::Zero();
+  Eigen::MatrixXd added = Eigen::MatrixXd::Zero(err::calibration_size, err::calibration_size);
   for (int camera = 0; camera < 2; ++camera) {
-    const int at = err::lens(camera) - kFirst;
+    const int baseline = err::baseline - err::camera, focal_length = err::lens(camera) - err::camera;
     const double variance = std::pow(sigma(err::lens(camera)), 2);
-    added.topLeftCorner<3, 3>() += variance * shorter * shorter.transpose();
-    added.block<3, 1>(0, at) = variance * shorter;
-    added.block<1, 3>(at, 0) = variance * shorter.transpose();
+    added.block<3, 3>(baseline, baseline) += variance * shorter * shorter.transpose();
+    added.block<3, 1>(baseline, focal_length) = variance * shorter;
+    added.block<1, 3>(focal_length, baseline) = variance * shorter.transpose();
   }
-  covariance_.inflate(kFirst, added);
+  covariance_.inflate(err::camera, added);
 }
 
 void Ekf::assume(const State& x, const Eigen::Ref<const Eigen::MatrixXd>& P) {

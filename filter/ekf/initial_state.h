@@ -11,6 +11,8 @@ namespace ear {
 /// [m, rad, 1] of position and yaw at the start, and of the wheels' scale where nothing can measure it: by definition
 /// zero, but regular.
 inline constexpr double kKnownSigma = 1e-6;
+/// [m/s^2] chosen: what rotors, idling or shaking, leave in the mean specific force (docs/decisions/0025).
+inline constexpr double kShakenAccel = 0.02;
 
 /// The same, if they are usable. Throw std::invalid_argument, naming the field.
 [[nodiscard]] const FilterConfig& checked(const FilterConfig& config);

@@ -11,9 +11,6 @@
 
 namespace ear {
 
-/// Chosen: samples that show a standard deviation to 1 / sqrt(2 n), 16 %.
-inline constexpr int kFewestForNoise = 20;
-
 class NoiseScore {
  public:
   /// [s] measured: 0.4 s costs 5 to 30 % where wheels slip; docs/decisions/0018

@@ -31,6 +31,7 @@ inline constexpr int axle = odometer + 3;           ///< position of O in the bo
 inline constexpr int beams = axle + 3;              ///< offset of each laser beam's range [m]
 inline constexpr int camera = beams + kMaxBeams;    ///< phi, p of camera 0 in the body: 6
 inline constexpr int stereo = camera + 6;           ///< phi, p of camera 1 in camera 0: 6
+inline constexpr int baseline = stereo + 3;         ///< its p
 inline constexpr int poses_size = 12;               ///< of these two
 inline constexpr int lenses = camera + poses_size;  ///< focal length, principal point of cameras 0 and 1: 3 each
 inline constexpr int lens_size = 3;

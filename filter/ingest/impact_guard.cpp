@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "filter/ingest/evidence.h"
+#include "filter/ingest/silence.h"
 
 namespace ear {
 namespace {
@@ -60,7 +61,7 @@ bool ExcessWatch::clipped(const Eigen::Vector3d& value) {
 /// that.
 ImpactGuard::ImpactGuard(const ImpactConfig& config, const ImuCalibration& imu)
     : gyro_(config.gyro_range, config.gyro_deviation, config.gyro_deviation / kTurnRate, 1.0),
-      accel_(config.accel_range, config.accel_deviation, kRecently, kAccelShare),
+      accel_(config.accel_range, config.accel_deviation, kStreamGap, kAccelShare),
       gyro_sigma_(imu.gyro_noise * std::sqrt(imu.rate_hz)),
       accel_sigma_(imu.accel_noise * std::sqrt(imu.rate_hz)) {}
 

@@ -12,8 +12,6 @@
 
 namespace ear {
 
-/// [s] chosen: how long ago is recent, but for the mean rate of a body, which turns fast though not suddenly.
-inline constexpr double kRecently = 0.2;
 /// [rad/s^2] chosen: no body turns more suddenly; a multirotor of 1.5 kg, 15 N on one side at 0.15 m.
 inline constexpr double kTurnRate = 100.0;
 

@@ -25,7 +25,7 @@ bool ImuClock::others_show(double step) const {
   for (const Other& other : others_) {
     if (!other.before_ns) continue;
     any = true;
-    if (step > 0.0 && seconds_between(*other.before_ns, *other.newest_ns) > kJumpShare * step) return false;
+    if (step > 0.0 && seconds_between(*other.before_ns, *other.newest_ns) > 0.5 * step) return false;
   }
   return any;
 }
@@ -71,7 +71,7 @@ void ImuClock::observe(Stream stream, TimeNs stamp_ns) {
   if (waiting_ && other.before_ns) {
     const double passed = static_cast<double>(samples_.size()) * interval_;
     const double measured = seconds_between(*other.before_ns, stamp_ns);
-    votes_ += std::abs(measured - passed) < kJumpShare * std::abs(jump_) ? 1 : -1;
+    votes_ += is_small_against(jump_, measured - passed) ? 1 : -1;
     const bool enough = samples_.size() >= kConfirmed || votes_ < 0;
     if (std::abs(votes_) >= kVotes && enough) settle(votes_ > 0);
   }
@@ -108,7 +108,7 @@ void ImuClock::review(Other& other, TimeNs stamp_ns) {
     return;
   }
   const double jumped = (ahead - other.ahead) / jump_;
-  contradictions_ = jumped > kJumpShare && jumped < 1.0 + kJumpShare ? contradictions_ + 1 : 0;
+  contradictions_ = is_small_against(1.0, jumped - 1.0) ? contradictions_ + 1 : 0;
   if (contradictions_ < kContradictions) return;
   shift_ns_ -= std::llround(1e9 * jump_);
   corrected_ns_.reset();

@@ -5,6 +5,7 @@
 
 #include "filter/ingest/evidence.h"
 #include "filter/ingest/impact_guard.h"
+#include "filter/ingest/silence.h"
 
 namespace ear {
 namespace {
@@ -23,7 +24,7 @@ bool SpikeWatch::add(ImuBuffer& samples, double dt, bool no_strike, bool clips) 
   const double spread = kClear * std::sqrt(step_variance_);
   const double limit = std::max(strikes_ && no_strike ? 0.0 : std::max(least_, least_rate_ * dt), spread);
   const double counted = std::min(step, limit);
-  step_variance_ += (1.0 - std::exp(-dt / kRecently)) * (counted * counted - step_variance_);
+  step_variance_ += (1.0 - std::exp(-dt / kStreamGap)) * (counted * counted - step_variance_);
 
   if (length_ > 0) {
     const double off = (measured_[length_ - 1] - before).norm();

@@ -9,8 +9,6 @@
 namespace ear {
 namespace {
 
-constexpr double kHeldSample = 0.04;  // [s] chosen: so far the newest inertial sample stands for the next one
-
 TimeNs begin_of(const WheelIncrement& increment) { return increment.from_ns; }
 TimeNs begin_of(const BeamRanges& ranges) { return ranges.t_ns; }
 TimeNs end_of(const WheelIncrement& increment) { return increment.to_ns; }
@@ -133,7 +131,7 @@ double Ingest::imu_interval() const {
 }
 
 bool Ingest::covers(TimeNs imu_time_ns) const {
-  return !imu_.empty() && seconds_between(imu_.newest().t_ns, imu_time_ns) < kHeldSample;
+  return !imu_.empty() && seconds_between(imu_.newest().t_ns, imu_time_ns) < kClockJump;  // a driver may be held up
 }
 
 InputCounts Ingest::counts() const {

@@ -15,8 +15,7 @@ double StreamClock::jump_at(TimeNs t_ns, TimeNs now_ns, double tick) const {
   const double intervals = std::max(1.0, std::round(passed / interval_));
   const double jump = seconds_between(*last_ns_, t_ns) - intervals * interval_;
   const double ahead = seconds_between(now_ns, t_ns) - ahead_;
-  return is_clock_jump(jump) && std::abs(jump) > tick && std::abs(ahead - jump) < kJumpShare * std::abs(jump) ? jump
-                                                                                                              : 0.0;
+  return is_clock_jump(jump) && std::abs(jump) > tick && is_small_against(jump, ahead - jump) ? jump : 0.0;
 }
 
 void StreamClock::follow(TimeNs t_ns, std::optional<TimeNs> now_ns) {
@@ -38,7 +37,7 @@ void StreamClock::follow(TimeNs t_ns, std::optional<TimeNs> now_ns) {
 bool StreamClock::shift_was_wrong(TimeNs stamp_ns, TimeNs now_ns) {
   const double own = seconds_between(now_ns, stamp_ns) - ahead_;
   const double shifted = own - 1e-9 * static_cast<double>(shift_ns_);
-  const bool against = shift_ns_ != 0 && is_clock_jump(shifted) && std::abs(own) < kJumpShare * std::abs(shifted);
+  const bool against = shift_ns_ != 0 && is_clock_jump(shifted) && is_small_against(shifted, own);
   contradictions_ = against ? contradictions_ + 1 : 0;
   return contradictions_ >= kContradictions;
 }

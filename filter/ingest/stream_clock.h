@@ -14,7 +14,6 @@
 namespace ear {
 
 inline constexpr double kClockJump = 0.04;   ///< [s] chosen: either way; less may be a driver that was held up
-inline constexpr double kJumpShare = 0.5;    ///< chosen: of a jump: readings that are off by less did not jump
 inline constexpr double kClockMemory = 2.0;  ///< [s] chosen: of how readings usually come
 /// Chosen: readings in a row, to put back what was taken out: so many do not all have false stamps, whatever their
 /// rate.
@@ -23,6 +22,9 @@ inline constexpr int kContradictions = 8;
 /// Of any sensor. `off`: by how much a stamp is off the place where it should be [s]. If it is more than what a state
 /// outlasts, it is another clock.
 [[nodiscard]] inline bool is_clock_jump(double off) { return std::abs(off) > kClockJump && std::abs(off) < kLostAfter; }
+
+/// Is `off` nearer to zero than to a jump of this size?
+[[nodiscard]] inline bool is_small_against(double jump, double off) { return std::abs(off) < 0.5 * std::abs(jump); }
 
 class StreamClock {
  public:

@@ -18,7 +18,7 @@ constexpr double kStill = 0.9;  // chosen: of the features that fit one motion; 
 }  // namespace
 
 void ImuScore::add_rest(const ImuStatistics& rest, const ImuCalibration& stated) {
-  if (rest.count < kFewestForNoise) return;
+  if (rest.count < kToKnow) return;
   at_rest_ = {std::max(1.0, rest.gyro_density / stated.gyro_noise),
               std::max(1.0, rest.accel_density / stated.accel_noise)};
 }

@@ -4,17 +4,16 @@
 
 #include "filter/ekf/imu_displacement.h"
 #include "filter/ekf/initial_state.h"
+#include "filter/ingest/silence.h"
 
 namespace ear {
 namespace {
 
 constexpr double kTakeoffVelocity = 0.05;  // [m/s] chosen: what the wheels were wrong by before a take-off was noticed
-constexpr double kTakeoffPosition = 5e-3;  // [m] chosen: what came of it
 constexpr double kGapAccel = 1.0;          // [m/s^2] chosen: while nothing was measured
 constexpr double kGapRate = 0.3;           // [rad/s] chosen: the same
 // A vehicle that stood begins to shake, and the biases of MEMS sensors are others then (vibration rectification).
-constexpr double kShakenGyro = 5e-4;   // [rad/s] measured: 4.7e-4 when the drone of euroc_mh01_mono took off
-constexpr double kShakenAccel = 0.02;  // [m/s^2] chosen: docs/decisions/0025
+constexpr double kShakenGyro = 5e-4;  // [rad/s] measured: 4.7e-4 when the drone of euroc_mh01_mono took off
 
 }  // namespace
 
@@ -31,7 +30,7 @@ Sources::Sources(const FilterConfig& config, const Calibration& calibration)
 }
 
 void Sources::inflate_after_takeoff(Ekf& ekf) {
-  ekf.inflate_motion(0.0, kTakeoffVelocity, kTakeoffPosition);
+  ekf.inflate_motion(0.0, kTakeoffVelocity, kTakeoffVelocity * kSilent);
   ekf.discard_bias_changes();
 }
 

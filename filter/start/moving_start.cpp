@@ -16,7 +16,6 @@ constexpr double kScaleSigma = 0.02;   // chosen: of a path; noise of the dispar
 constexpr double kPathSigma = 1e-3;    // [m] chosen: the least of a path
 constexpr double kAccelSigma = 0.3;    // [m/s^2] chosen: what a poor accelerometer may be off between two frames
 constexpr double kWorstGravity = 0.7;  // [m/s^2] chosen: by which the cameras alone may miss it
-constexpr double kWorstFit = 2.5;      // chosen: root mean square residual, in standard deviations
 
 using Fit = StartFit<9>;  // the gyroscope's bias is found before
 
@@ -127,7 +126,7 @@ std::optional<ImuState> MovingStart::solve(const ImuBuffer& imu) const {
 
   // Gravity as the cameras alone see it must have about its known size.
   if (!(std::abs(fit.free_gravity() + kGravity_W.z()) < kWorstGravity)) return std::nullopt;
-  const std::optional<Fit::Vector> x = fit.solve(kWorstFit);
+  const std::optional<Fit::Vector> x = fit.solve();
   if (!x) return std::nullopt;
   return start_state(start_ns, x->segment<3>(Fit::velocity), x->segment<3>(Fit::gravity), b_g,
                      x->segment<3>(Fit::accel_bias));

@@ -11,7 +11,6 @@ namespace {
 
 constexpr double kSpeedSigma = 0.02;      // [m/s] chosen: the least of a speed
 constexpr double kDirectionSigma = 0.05;  // [rad] chosen: of the velocity in the body, which pitches about the axle
-constexpr double kWorstFit = 2.0;         // chosen: root mean square residual, in standard deviations
 
 using Fit = StartFit<12>;
 
@@ -77,7 +76,7 @@ std::optional<ImuState> rolling_start(const ImuBuffer& imu, const Ring<WheelIncr
     const double sigma = std::hypot(kSpeedSigma, direction * speed);
     fit.add(H, z, sigma * sigma);
   }
-  const std::optional<Fit::Vector> x = fit.solve(kWorstFit);
+  const std::optional<Fit::Vector> x = fit.solve();
   if (!x) return std::nullopt;
   return start_state(start_ns, x->segment<3>(Fit::velocity), x->segment<3>(Fit::gravity), x->segment<3>(Fit::gyro_bias),
                      x->segment<3>(Fit::accel_bias));

@@ -13,11 +13,10 @@
 namespace ear {
 namespace {
 
-constexpr double kMovingVelocity = 0.5;      // [m/s] chosen: and share of the speed, before the window is used
-constexpr double kGravityTolerance = 1.5;    // [m/s^2] chosen: of the specific force at rest; more is a wrong unit
-constexpr double kStartGravityNoise = 0.02;  // [m/s^2] chosen: what idling rotors leave in the mean specific force
-constexpr double kLeastStartSpeed = 0.2;     // [m/s] chosen: a first start in motion; slower is as good as standing
-constexpr double kUnknownTilt = 0.3;         // [rad] chosen: before gravity was measured
+constexpr double kMovingVelocity = 0.5;    // [m/s] chosen: and share of the speed, before the window is used
+constexpr double kGravityTolerance = 1.5;  // [m/s^2] chosen: of the specific force at rest; more is a wrong unit
+constexpr double kLeastStartSpeed = 0.2;   // [m/s] chosen: a first start in motion; slower is as good as standing
+constexpr double kUnknownTilt = 0.3;       // [rad] chosen: before gravity was measured
 
 constexpr double kVague = 10.0;          // chosen: times the sigma of a velocity that is then measured with that sigma
 constexpr double kUnitTolerance = 1e-3;  // chosen: of the length of a quaternion: digits that were cut off
@@ -169,7 +168,7 @@ std::optional<StartState> Start::standing(TimeNs t_ns, const ImuStatistics& imu)
 
   // force = R^T (-g) + b_a + n, rate = b_g + n; with the invariant error, R^T u = R^^T (u + [u]x theta).
   const double root_duration = std::sqrt(imu.duration);
-  const double accel_sigma = std::hypot(calibration_.imu.accel_noise / root_duration, kStartGravityNoise);
+  const double accel_sigma = std::hypot(calibration_.imu.accel_noise / root_duration, kShakenAccel);
   const double gyro_sigma = calibration_.imu.gyro_noise / root_duration;
   start.H.setZero(6, err::imu_size);
   start.residual.resize(6);

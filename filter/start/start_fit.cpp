@@ -14,9 +14,10 @@ double StartFit<N>::free_gravity() const {
 
 /// Gravity's size is a row along its present direction, again as the direction gets better.
 template <int N>
-std::optional<Eigen::Matrix<double, N, 1>> StartFit<N>::solve(double worst) const {
-  constexpr double kSigma = 0.01;  // [m/s^2] chosen: of the known size
-  constexpr int kIterations = 3;   // chosen
+std::optional<Eigen::Matrix<double, N, 1>> StartFit<N>::solve() const {
+  constexpr double kSigma = 0.01;    // [m/s^2] chosen: of the known size
+  constexpr double kWorstFit = 2.5;  // chosen: root mean square residual, in standard deviations
+  constexpr int kIterations = 3;     // chosen
   Vector x = A_.ldlt().solve(b_);
   for (int i = 0; i < kIterations; ++i) {
     const Eigen::Vector3d along = x.template segment<3>(gravity).normalized() / kSigma;
@@ -27,7 +28,7 @@ std::optional<Eigen::Matrix<double, N, 1>> StartFit<N>::solve(double worst) cons
     x = with_gravity.ldlt().solve(rhs);
   }
   const double squares = x.dot(A_ * x) - 2.0 * b_.dot(x) + cost_;
-  return squares <= worst * worst * rows_ ? std::optional(x) : std::nullopt;
+  return squares <= kWorstFit * kWorstFit * rows_ ? std::optional(x) : std::nullopt;
 }
 
 template class StartFit<9>;

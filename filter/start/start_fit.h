@@ -30,8 +30,8 @@ class StartFit {
 
   /// The size of gravity as the rows alone show it [m/s^2].
   [[nodiscard]] double free_gravity() const;
-  /// Nothing if the root mean square residual, in standard deviations, is more than `worst`.
-  [[nodiscard]] std::optional<Vector> solve(double worst) const;
+  /// Nothing if it does not fit.
+  [[nodiscard]] std::optional<Vector> solve() const;
 
  private:
   Eigen::Matrix<double, N, N> A_ = Eigen::Matrix<double, N, N>::Zero();

@@ -13,7 +13,6 @@ namespace {
 
 constexpr double kBridgePosition = 5e-3;  // [m] chosen, as kSeenTurn: well above what the features will show later
 constexpr double kComparedStep = 1e-4;    // [rad, m] chosen: a tenth of what two images show
-constexpr double kRecent = 0.3;           // [s] chosen: an image shows the motion for so long
 constexpr double kNoisy = 1.25;           // chosen: times the usual noise of a feature; less may be chance
 
 }  // namespace
@@ -50,7 +49,7 @@ Displacement Cameras::displacement(const FeatureFrame& frame, TimeNs t_ns, const
     start.p_B0B1 = motion.p_BiBj;
     compared_.seen = stereo_motion(matches, ekf.state().camera, start, feature_sigma(), kComparedStep, config_.kernels);
     result.available = compared_.seen.has_value();
-    result.contradictory = !compared_.seen && matches.size() >= kFewestMatches;
+    result.contradictory = !compared_.seen && matches.size() >= kFewFeatures;
     if (compared_.seen) result.p_BiBj = compared_.seen->p_B0B1;
     if (compared_.seen) result.covariance = compared_.seen->p_covariance();
   }
@@ -162,7 +161,7 @@ void Cameras::remember(const FeatureFrame& frame, const Ekf& ekf) {
 
 bool Cameras::show_motion(const State& x) const {
   return last_ && compared_.agrees && last_features_.features.size() >= kFewFeatures &&
-         seconds_between(imu_time(last_->t_ns, x.camera), x.imu.t_ns) < kRecent;
+         seconds_between(imu_time(last_->t_ns, x.camera), x.imu.t_ns) < kStreamGap;
 }
 
 void Cameras::reset() {

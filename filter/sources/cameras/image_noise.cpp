@@ -5,6 +5,7 @@
 #include "filter/ekf/noise_score.h"
 #include "filter/ekf/so3.h"
 #include "filter/ingest/capacity.h"
+#include "filter/ingest/evidence.h"
 #include "filter/ingest/median.h"
 
 namespace ear {
@@ -28,7 +29,7 @@ double ImageNoise::measure(const FeatureFrame& frame, const CameraState& cameras
     const double gradient = line.head<2>().squaredNorm() + (E.transpose() * right).head<2>().squaredNorm();
     if (gradient > 0.0) distances_.push_back(right.dot(line) / std::sqrt(gradient));  // to first order, Sampson's
   }
-  if (distances_.size() < kFewestForNoise) return 0.0;
+  if (distances_.size() < kToKnow) return 0.0;
   const double common = upper_median(distances_);
   for (double& distance : distances_) distance = std::abs(distance - common);
   return kSigmasPerMedian * upper_median(distances_);

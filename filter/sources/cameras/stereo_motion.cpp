@@ -8,16 +8,16 @@
 
 #include "filter/ekf/so3.h"
 #include "filter/ingest/capacity.h"
+#include "filter/ingest/evidence.h"
 #include "filter/kernels/filter_kernels.h"
+#include "filter/sources/cameras/frame_agreement.h"
 #include "filter/sources/cameras/triangulation.h"
 
 namespace ear {
 namespace {
 
-constexpr int kIterations = 12;      // chosen
-constexpr double kLeastShare = 0.6;  // chosen: of the features that fit
-constexpr double kHuber = 2.0;       // [standard deviations] chosen: from where an observation weighs less
-constexpr double kFits = 3.5;        // [standard deviations] chosen: of an observation that does
+constexpr int kIterations = 12;  // chosen
+constexpr double kHuber = 2.0;   // [standard deviations] chosen: from where an observation weighs less
 
 /// Sums of one Gauss-Newton step over (rotation, translation).
 struct NormalEquations {
@@ -79,7 +79,7 @@ class Problem {
     const Eigen::Matrix3d R_C1C0 = cameras.T_C0C1.R.transpose();
     plain_.right0 = plain(R_C1C0, -(R_C1C0 * cameras.T_C0C1.p));
     plain_.huber = kHuber;
-    plain_.fits = kFits;
+    plain_.fits = kClear;
     plain_.least_depth = kLeastDepth;
   }
 
@@ -175,7 +175,7 @@ std::optional<StereoMotion> stereo_motion(const std::vector<StereoMatch>& matche
                                           const StereoMotion& start, double sigma, double settled, Kernels kernels) {
   StereoMotion motion = start;
   motion.matches = static_cast<int>(matches.size());
-  if (motion.matches < static_cast<int>(kFewestMatches)) return std::nullopt;
+  if (motion.matches < kFewFeatures) return std::nullopt;
   Problem problem(matches, cameras, sigma, kernels);
   for (int iteration = 0; iteration < kIterations; ++iteration) {
     const NormalEquations sums = problem.step(motion, motion.fitting);
@@ -187,8 +187,7 @@ std::optional<StereoMotion> stereo_motion(const std::vector<StereoMatch>& matche
     motion.covariance = ldlt.solve(Eigen::Matrix<double, 6, 6>::Identity());
     if (step.norm() < settled) break;
   }
-  const bool together =
-      motion.fitting >= static_cast<int>(kFewestMatches) && motion.fitting >= kLeastShare * motion.matches;
+  const bool together = motion.fitting >= kFewFeatures && motion.fitting >= kMajority * motion.matches;
   if (!together || !(motion.covariance.diagonal().minCoeff() > 0.0)) return std::nullopt;
   return motion;
 }

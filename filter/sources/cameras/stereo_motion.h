@@ -40,8 +40,6 @@ class StereoMatches {
 [[nodiscard]] double stereo_inverse_depth(const CameraState& cameras, const Eigen::Vector2d& left,
                                           const Eigen::Vector2d& right);
 
-/// Fewer features show no motion.
-inline constexpr std::size_t kFewestMatches = 12;
 /// [rad] chosen: standard deviation of a turn between two images, whatever the fit's covariance is.
 inline constexpr double kSeenTurn = 2e-3;
 

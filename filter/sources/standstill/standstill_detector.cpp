@@ -6,13 +6,13 @@
 #include "filter/ingest/capacity.h"
 #include "filter/ingest/median.h"
 #include "filter/ingest/silence.h"
+#include "filter/sources/cameras/frame_agreement.h"
 
 namespace ear {
 namespace {
 
-constexpr std::size_t kMinCommonFeatures = 8;  // chosen: fewer do not set motion apart from mismatches
-constexpr double kNoRest = 0.05;               // [s] chosen: wheels that turned so lately turn
-constexpr double kWheelPlay = 0.005;           // [rad] chosen: that a wheel at rest may turn: 0.4 mm of its rim
+constexpr double kNoRest = 0.05;      // [s] chosen: wheels that turned so lately turn
+constexpr double kWheelPlay = 0.005;  // [rad] chosen: that a wheel at rest may turn: 0.4 mm of its rim
 
 }  // namespace
 
@@ -100,7 +100,7 @@ std::optional<double> StandstillDetector::common_flow_px(const FeatureFrame& fra
     flow_[2].push_back(outward.dot(flow));
     flow_[3].push_back(outward.x() * flow.y() - outward.y() * flow.x());
   }
-  if (flow_[0].size() < kMinCommonFeatures) return std::nullopt;
+  if (flow_[0].size() < kFewFeatures) return std::nullopt;
   double largest = 0.0;
   for (auto& component : flow_) largest = std::max(largest, std::abs(upper_median(component)));
   return largest;

@@ -5,13 +5,9 @@
 #include <initializer_list>
 
 #include "filter/ekf/propagation.h"
+#include "filter/ingest/silence.h"
 
 namespace ear {
-namespace {
-
-constexpr double kLifting = 0.3;  // [s] chosen: after wheels that leave the ground, or meet it, as it seems
-
-}  // namespace
 
 Wheels::Wheels(const OdometerConfig& config, const Calibration& calibration, bool sees_ground)
     : config_(config),
@@ -161,7 +157,7 @@ Displacement Wheels::displacement(const Ekf& ekf, const WheelIncrements& increme
 }
 
 bool Wheels::lifting(TimeNs t_ns) const {
-  return running_.lifted_ns && seconds_between(*running_.lifted_ns, t_ns) < kLifting;
+  return running_.lifted_ns && seconds_between(*running_.lifted_ns, t_ns) < kStreamGap;
 }
 
 }  // namespace ear
