@@ -8,7 +8,6 @@ namespace {
 
 constexpr double kPrior = 4.0;          // innovations that the usual noise counts for; measured: 4 to 16 differ little
 constexpr double kFitting = 1.0 / 3.0;  // chosen: the least weight of a sensor that fits, three standard deviations
-constexpr double kLasts = 0.1;          // [s] measured: an error that does not fit is the same for so long
 constexpr int kIterations = 3;          // chosen: of the two equations of the belief; more change nothing that matters
 
 }  // namespace
@@ -18,8 +17,7 @@ double NoiseScore::factor(double square, double count) const {
 }
 
 /// The mean-field equations: given the factor, the update leaves `share` of the residual, and of the state's variance,
-/// to the noise; the factor is the mean of the noises' squares. A slip or a bump is no white noise: so many readings
-/// share one error as come while it lasts.
+/// to the noise; the factor is the mean of the noises' squares.
 double NoiseScore::add(double residual, const Expected& expected, TimeNs t_ns) {
   const double dt = last_ns_ ? std::max(0.0, seconds_between(*last_ns_, t_ns)) : 0.0;
   last_ns_ = t_ns;
@@ -35,8 +33,7 @@ double NoiseScore::add(double residual, const Expected& expected, TimeNs t_ns) {
   }
   squares_ += square;
   count_ += 1.0;
-  if (!expected.adapts) return 1.0;
-  return 1.0 + (believed - 1.0) * std::max(1.0, dt > 0.0 ? kLasts / dt : 1.0);
+  return expected.adapts ? believed : 1.0;
 }
 
 double NoiseScore::weight() const { return 1.0 / std::sqrt(factor(0.0, 0.0)); }

@@ -119,7 +119,7 @@ class Board {
 };
 
 /// Of a sample: which one it is, and its time by our clock.
-struct Stamp {
+struct TickedStamp {
   std::size_t tick;
   TimeNs t_ns;
 };
@@ -175,14 +175,14 @@ struct Ear {
     return false;
   }
   [[nodiscard]] bool heard(const std::string& words) const { return said.find(words) != std::string::npos; }
-  [[nodiscard]] std::vector<Stamp> stamps() {
+  [[nodiscard]] std::vector<TickedStamp> stamps() {
     const std::lock_guard lock(mutex);
     return imu;
   }
 
   LiveClock clock;
   std::mutex mutex;
-  std::vector<Stamp> imu;
+  std::vector<TickedStamp> imu;
   std::atomic<int> wheels{0}, ranges{0};
   std::string said;
   std::atomic<MavlinkLines*> outputs{nullptr};
@@ -212,7 +212,7 @@ TEST_CASE("mavlink serial: samples of a board get our time by TIMESYNC, and odom
   CAPTURE(board.odometry());
   REQUIRE(all_came);
   CHECK(ear.heard("mavlink: the clocks are synchronised"));
-  const std::vector<Stamp> stamps = ear.stamps();
+  const std::vector<TickedStamp> stamps = ear.stamps();
   const std::vector<TimeNs> taken = board.taken();
   std::vector<double> off;
   for (std::size_t i = stamps.size() - 100; i < stamps.size(); ++i) {

@@ -8,6 +8,11 @@
 #include "filter/ingest/silence.h"
 
 namespace ear {
+namespace {
+
+constexpr double kSlipLasts = 0.1;  // [s] measured, docs/decisions/0039: a slip is the same for so long
+
+}  // namespace
 
 Wheels::Wheels(const OdometerConfig& config, const Calibration& calibration, bool sees_ground)
     : config_(config),
@@ -25,7 +30,7 @@ void Wheels::update(const WheelIncrement& increment, const Context& context, Ekf
   WheelRows rows = linearize_wheels(x, motion.R_WB, motion.v_W, increment, rate.gyro_B, config_.model, sees_ground_);
   Sigmas sigma = noise_of(rows, increment, rate, x);
   add_delay(sigma, increment, ekf);
-  score_wheels(rows, sigma, increment.to_ns, context, ekf, records);
+  score_wheels(rows, sigma, increment, context, ekf, records);
 
   const bool use_yaw_rate = config_.model != OdometerModel::gyro;
   const std::array<bool, WheelRows::size> use = {true, true, !uses_plane() || context.ground_known, use_yaw_rate};
@@ -94,11 +99,13 @@ void Wheels::add_delay(Sigmas& sigma, const WheelIncrement& increment, const Ekf
 }
 
 /// Each wheel by itself: the axle's speed and yaw rate predict how fast it should roll. Where the speed is measured
-/// moves along the axle to the wheel that fits better, and its noise grows with what both have.
-void Wheels::score_wheels(WheelRows& rows, Sigmas& sigma, TimeNs t_ns, const Context& context, const Ekf& ekf,
-                          Records& records) {
+/// moves along the axle to the wheel that fits better, and its noise grows with what both have. A slip is no white
+/// noise: so many readings share one error as come while it lasts.
+void Wheels::score_wheels(WheelRows& rows, Sigmas& sigma, const WheelIncrement& increment, const Context& context,
+                          const Ekf& ekf, Records& records) {
   const double half = 0.5 * ekf.state().odometer.track_width;
   const double noise = std::hypot(sigma(WheelRows::speed), half * sigma(WheelRows::yaw_rate));
+  const double readings = std::max(1.0, kSlipLasts / (increment.duration()));
   std::array<double, 2> information{};
   for (std::size_t i = 0; i < 2; ++i) {
     const double side = i == 0 ? -half : half;
@@ -107,11 +114,12 @@ void Wheels::score_wheels(WheelRows& rows, Sigmas& sigma, TimeNs t_ns, const Con
     Innovation innovation =
         ekf.test(H, rows.residual(WheelRows::speed) + side * rows.residual(WheelRows::yaw_rate), noise);
     NoiseScore& score = running_.wheel[i];
-    information[i] =
-        1.0 / score.add(innovation.value, {innovation.variance - noise * noise, noise * noise, config_.scores}, t_ns);
+    const double factor = score.add(
+        innovation.value, {innovation.variance - noise * noise, noise * noise, config_.scores}, increment.to_ns);
+    information[i] = 1.0 / (1.0 + (factor - 1.0) * readings);
     innovation.fits = score.fits();
     innovation.score = context.weight * score.weight();
-    records.log.add(i == 0 ? Source::wheel_left : Source::wheel_right, innovation, t_ns);
+    records.log.add(i == 0 ? Source::wheel_left : Source::wheel_right, innovation, increment.to_ns);
     count(score, records.statistics);
   }
   const double sum = information[0] + information[1];

@@ -53,8 +53,8 @@ class Wheels {
   [[nodiscard]] Sigmas noise_of(const WheelRows& rows, const WheelIncrement& increment, const MeanRate& rate,
                                 const State& x) const;
   static void add_delay(Sigmas& sigma, const WheelIncrement& increment, const Ekf& ekf);
-  void score_wheels(WheelRows& rows, Sigmas& sigma, TimeNs t_ns, const Context& context, const Ekf& ekf,
-                    Records& records);
+  void score_wheels(WheelRows& rows, Sigmas& sigma, const WheelIncrement& increment, const Context& context,
+                    const Ekf& ekf, Records& records);
   static void count(const NoiseScore& score, FrameStatistics& statistics);
 
   /// What the last increments have shown.
