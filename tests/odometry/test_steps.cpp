@@ -186,11 +186,11 @@ TEST_CASE("steps while images are missing: better than to wait for the next imag
   CHECK(with.rms < 1.02 * without.rms);
 }
 
-TEST_CASE("steps of a vehicle without cameras: a bias that jumps loses nothing") {
+TEST_CASE("steps of a vehicle without cameras: a small jump of a bias loses nothing") {
   simulator::Options options;
   options.seed = 1;
   options.tracks = false;
-  options.faults = {simulator::parse_fault("imu_bias_jump.gyro@20+20")};
+  options.faults = {simulator::parse_fault("imu_bias_jump.gyro@20+20=0.01")};
   const Simulation simulation(options);
   Calibration calibration = simulation.calibration();
   calibration.cameras.clear();
@@ -216,7 +216,7 @@ TEST_CASE("steps of a vehicle without cameras: a bias that jumps loses nothing")
   MESSAGE("largest error " << largest_off << " m");
   REQUIRE(world);
   CHECK(missing == 0);
-  CHECK(largest_off < 1.2);  // wheels alone do not show the jump: measured 0.90 m, 0.6 m where it was looked for
+  CHECK(largest_off < 0.9);  // wheels alone do not show the jump; one of 0.02 rad/s is lost: docs/decisions/0039
 }
 
 }  // namespace

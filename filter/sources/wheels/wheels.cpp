@@ -105,7 +105,7 @@ void Wheels::score_wheels(WheelRows& rows, Sigmas& sigma, const WheelIncrement& 
                           const Ekf& ekf, Records& records) {
   const double half = 0.5 * ekf.state().odometer.track_width;
   const double noise = std::hypot(sigma(WheelRows::speed), half * sigma(WheelRows::yaw_rate));
-  const double readings = std::max(1.0, kSlipLasts / (increment.duration()));
+  const double readings = std::max(1.0, kSlipLasts / increment.duration());
   std::array<double, 2> information{};
   for (std::size_t i = 0; i < 2; ++i) {
     const double side = i == 0 ? -half : half;
