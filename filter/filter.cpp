@@ -80,7 +80,7 @@ std::optional<Estimate> Filter::report(bool image, const FrameAgreement& seen) {
   const std::optional<Estimate> estimate = make_estimate(sources_.ground().known(), scales);
   const HealthMonitor::Frame frame = health_frame(image, seen, estimate);
   health_.add_frame(frame, records_.log.records());
-  if (frame.running && !frame.possible) stop();
+  if (frame.running && !health_.possible()) stop();
   return give(estimate);
 }
 

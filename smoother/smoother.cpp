@@ -117,7 +117,7 @@ std::optional<Estimate> Smoother::report(bool image, const FrameAgreement& seen)
     frame.possible = frame.possible && explained(last_good_->state, estimate->state);
   }
   health_.add_frame(frame, records_.log.records());
-  if (window_ && (!frame.possible || health_.contradicted())) stop();
+  if (window_ && (!health_.possible() || health_.contradicted())) stop();
   return give(estimate);
 }
 

@@ -44,7 +44,8 @@ void Ekf::start(const ImuState& x, const Eigen::VectorXd& sigma, bool scale_is_g
 void Ekf::correlate_baseline_and_lenses(const Eigen::VectorXd& sigma) {
   if (!(sigma(err::baseline) > 0.0)) return;
   const Eigen::Vector3d shorter = -0.5 * state_.camera.T_C0C1.p;  // per relative error of one focal length
-  Eigen::MatrixXd added = Eigen::MatrixXd::Zero(err::calibration_size, err::calibration_size);
+  using Matrix = Eigen::Matrix<double, err::calibration_size, err::calibration_size>;
+  Matrix added = Matrix::Zero();
   for (int camera = 0; camera < 2; ++camera) {
     const int baseline = err::baseline - err::camera, focal_length = err::lens(camera) - err::camera;
     const double variance = std::pow(sigma(err::lens(camera)), 2);

@@ -167,6 +167,8 @@ void HealthMonitor::judge_ground(const Frame& frame, const std::array<SourceReco
   for (std::size_t beam = 0; beam < beams_; ++beam) judge(beam_source(beam), no_range || no_return_[beam]);
 }
 
+bool HealthMonitor::possible() const { return last_.possible && last_.speed < kFastest; }
+
 bool HealthMonitor::velocity_known() const {
   return last_.speed < kFastest && last_.velocity_sigma < std::max(kWorstVelocity, kWorstDirection * last_.speed);
 }

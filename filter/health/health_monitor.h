@@ -70,6 +70,8 @@ class HealthMonitor {
   [[nodiscard]] bool usable() const {
     return health_.status == HealthStatus::tracking || health_.status == HealthStatus::degraded;
   }
+  /// Can a vehicle be where and as fast as the state says? Else it is no state.
+  [[nodiscard]] bool possible() const;
   /// All sources but the inertial ones contradict the state, for long: it may be the state that is wrong.
   [[nodiscard]] bool contradicted() const { return life_.contradicted; }
 

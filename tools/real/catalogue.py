@@ -56,7 +56,8 @@ HELD = {
     "euroc_v101_mono": Held("V1_01 in motion, one camera", "euroc",
                             "a single camera in motion shows no scale: no estimate is the right answer"),
     "euroc_mh01_mono": Held("MH_01 reversed in time: stands 4 s, then flies 5 m; one camera", "euroc",
-                            "the errors are millimetres, where those of the truth count in NEES"),
+                            "the errors are millimetres, where those of the truth count in NEES: while it stands, the truth's heading moves by 1.3 mrad in 1.8 s, "
+                            "where the estimate's standard deviation is 0.16; the orientation's NEES is 47 there"),
     "kitti_a": Held("a car, stereo 10 Hz, starts at 7 m/s", "kitti_raw",
                     "of the IMU only 16 % of the packets exist, and its samples are 53 ms late against the attitude of the truth, "
                     "which comes from the same device: in the turn at the start that is 1.2 degrees of yaw. The truth has gaps, each of which takes a frame's interval off the coverage"),
