@@ -343,6 +343,10 @@ TEST_CASE("health: what is not a number, or a velocity that may be anything, is 
   drive.frame.velocity_sigma = std::numeric_limits<double>::infinity();
   drive.go_on(0.05);
   CHECK(drive.health().status == HealthStatus::lost);
+  CHECK(drive.monitor.possible());
+  drive.frame.speed = 120.0;  // no vehicle is so fast: it is not to be waited for
+  drive.go_on(0.05);
+  CHECK_FALSE(drive.monitor.possible());
 }
 
 TEST_CASE("health: a step between two images is no image without features") {

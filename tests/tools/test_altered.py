@@ -96,5 +96,15 @@ class OneCamera(unittest.TestCase):
         self.assertLess(figures["nees"]["orientation"]["mean"], 30.0)
 
 
+@unittest.skipUnless((DATA / "lawn_wheels/mav0").is_dir(), f"{DATA}/lawn_wheels is not here")
+class Mower(unittest.TestCase):
+    """Wheels and a gyroscope in degrees per second: lost again and again, but not with a state that no vehicle can have."""
+
+    def test_stays_on_earth(self):
+        figures = figures_of("lawn_wheels", ["gyro_degrees"])["gyro_degrees"]
+        self.assertEqual(figures["false_tracking"]["percent"], 0.0)
+        self.assertLess(figures["ate_rmse_m"], 1e6)  # 3e27 m where a state goes on while lost, however fast it is
+
+
 if __name__ == "__main__":
     unittest.main()
