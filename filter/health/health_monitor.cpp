@@ -18,6 +18,29 @@ constexpr int kTrackQuality = 2;      // chosen: for each feature
 constexpr int kInertialQuality = 10;  // chosen
 constexpr int kDegradedQuality = 60;  // chosen: at most, where a sensor is missing
 
+/// Health::quality of an estimate that may be used.
+int quality(const Health& health, int tracks) {
+  int points = 0;
+  switch (health.aiding) {
+    case Aiding::standing:
+      points = 100;
+      break;
+    case Aiding::cameras_and_wheels:
+      points = kWheelQuality + kTrackQuality * tracks;
+      break;
+    case Aiding::cameras:
+      points = kTrackQuality * tracks;
+      break;
+    case Aiding::wheels:
+      points = kWheelQuality;
+      break;
+    case Aiding::none:
+      points = kInertialQuality;
+      break;
+  }
+  return std::clamp(points, 1, health.status == HealthStatus::degraded ? kDegradedQuality : 100);
+}
+
 }  // namespace
 
 HealthMonitor::HealthMonitor(const Calibration& calibration, bool uses_wheels, bool uses_beams)
@@ -138,7 +161,7 @@ void HealthMonitor::add_frame(const Frame& frame, const std::array<SourceRecord,
   health_.horizontal_sigma = frame.horizontal_sigma;
   health_.vertical_sigma = frame.vertical_sigma;
   decide(t_ns);
-  health_.quality = quality(last_);
+  health_.quality = usable() ? quality(health_, last_.statistics.tracks) : 0;
 }
 
 /// Wheels and beams have something to show on the ground only.
@@ -236,29 +259,6 @@ Reason HealthMonitor::reason(TimeNs t_ns) const {
   if (life_.contradicted) return Reason::images_contradict;
   if (seconds_between(life_.aided_ns, t_ns) >= kLostAfter) return Reason::inertia_alone;
   return velocity_known() ? Reason::proving : Reason::velocity_lost;
-}
-
-int HealthMonitor::quality(const Frame& frame) const {
-  if (!usable()) return 0;
-  int points = 0;
-  switch (health_.aiding) {
-    case Aiding::standing:
-      points = 100;
-      break;
-    case Aiding::cameras_and_wheels:
-      points = kWheelQuality + kTrackQuality * frame.statistics.tracks;
-      break;
-    case Aiding::cameras:
-      points = kTrackQuality * frame.statistics.tracks;
-      break;
-    case Aiding::wheels:
-      points = kWheelQuality;
-      break;
-    case Aiding::none:
-      points = kInertialQuality;
-      break;
-  }
-  return std::clamp(points, 1, health_.status == HealthStatus::degraded ? kDegradedQuality : 100);
 }
 
 }  // namespace ear

@@ -84,7 +84,6 @@ class HealthMonitor {
   [[nodiscard]] Aiding aiding_at(TimeNs t_ns) const;
   [[nodiscard]] const FaultState& fault_of(Source source) const;
   [[nodiscard]] bool velocity_known() const;
-  [[nodiscard]] int quality(const Frame& frame) const;
   void report(std::initializer_list<Source> sources, TimeNs t_ns);
 
   /// Stamps [ns] of what came last.

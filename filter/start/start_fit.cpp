@@ -16,7 +16,7 @@ double StartFit<N>::free_gravity() const {
 template <int N>
 std::optional<Eigen::Matrix<double, N, 1>> StartFit<N>::solve() const {
   constexpr double kSigma = 0.01;    // [m/s^2] chosen: of the known size
-  constexpr double kWorstFit = 2.5;  // chosen: root mean square residual, in standard deviations
+  constexpr double kWorstFit = 2.0;  // chosen: root mean square residual, in standard deviations
   constexpr int kIterations = 3;     // chosen
   Vector x = A_.ldlt().solve(b_);
   for (int i = 0; i < kIterations; ++i) {

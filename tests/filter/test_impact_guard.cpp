@@ -73,11 +73,11 @@ TEST_CASE("impact: a strike counts while it lasts, not a sample longer, and leav
   for (int i = 0; i < 100; ++i) CHECK(stream.add(0.0).accel == 1.0);
 }
 
-TEST_CASE("impact: a change that lasts is no strike any more once the mean has followed it, after 0.3 s") {
+TEST_CASE("impact: a change that lasts is no strike any more once the mean has followed it, after 0.4 s") {
   Stream stream;
   for (int i = 0; i < 400; ++i) stream.add(0.0);
   CHECK(stream.add(25.0).accel > 10.0);
-  for (int i = 0; i < 62; ++i) stream.add(25.0);
+  for (int i = 0; i < 82; ++i) stream.add(25.0);
   for (int i = 0; i < 100; ++i) CHECK(stream.add(25.0).accel == 1.0);
 }
 
