@@ -43,7 +43,9 @@ TEST_CASE("figures: who is told the true lenses sees features where they are, wh
   REQUIRE(wrong.ate_rmse);
   MESSAGE(*truth.ate_rmse, " m and ", *wrong.ate_rmse, " m, NEES ", *truth.nees_position, " and ",
           *wrong.nees_position);
-  CHECK(*truth.ate_rmse < 0.5 * *wrong.ate_rmse);
+  CHECK(*truth.ate_rmse < 0.8 * *wrong.ate_rmse);
+  CHECK(*truth.nees_position < 4.0);  // 1.7, and 82 for who is told wrong lenses
+  CHECK(*wrong.nees_position > 20.0);
   CHECK(*truth.nees_orientation < 6.0);
 }
 
