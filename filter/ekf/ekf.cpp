@@ -44,10 +44,11 @@ void Ekf::start(const ImuState& x, const Eigen::VectorXd& sigma, bool scale_is_g
 void Ekf::correlate_baseline_and_lenses(const Eigen::VectorXd& sigma) {
   if (!(sigma(err::baseline) > 0.0)) return;
   const Eigen::Vector3d shorter = -0.5 * state_.camera.T_C0C1.p;  // per relative error of one focal length
-  using Matrix = Eigen::Matrix<double, err::calibration_size, err::calibration_size>;
-  Matrix added = Matrix::Zero();
+  Eigen::Matrix<double, err::calibration_size, err::calibration_size> added;
+  added.setZero();
+  constexpr int baseline = err::baseline - err::camera;
   for (int camera = 0; camera < 2; ++camera) {
-    const int baseline = err::baseline - err::camera, focal_length = err::lens(camera) - err::camera;
+    const int focal_length = err::lens(camera) - err::camera;
     const double variance = std::pow(sigma(err::lens(camera)), 2);
     added.block<3, 3>(baseline, baseline) += variance * shorter * shorter.transpose();
     added.block<3, 1>(baseline, focal_length) = variance * shorter;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "filter/ingest/evidence.h"
 #include "filter/ingest/silence.h"
 
 namespace ear {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "filter/ingest/evidence.h"
 #include "filter/ingest/silence.h"
 #include "filter/ingest/stream_clock.h"
 

@@ -5,7 +5,8 @@
 
 namespace ear {
 
-/// [s] chosen: samples that do not come for so long are missing, and the stamp that follows needs to be confirmed.
+/// [s] chosen: a moment. Samples that do not come for so long are missing, and the stamp that follows needs to be
+/// confirmed; what came within it is recent: a mean, a noise, an image, wheels that seemed to lift.
 inline constexpr double kStreamGap = 0.25;
 /// [s] chosen: what a sensor showed so long ago shows nothing of now.
 inline constexpr double kStale = 0.5;

@@ -30,7 +30,7 @@ Sources::Sources(const FilterConfig& config, const Calibration& calibration)
 }
 
 void Sources::inflate_after_takeoff(Ekf& ekf) {
-  ekf.inflate_motion(0.0, kTakeoffVelocity, kTakeoffVelocity * kSilent);
+  ekf.inflate_motion(0.0, kTakeoffVelocity, kTakeoffVelocity * kSilent);  // for so long unnoticed
   ekf.discard_bias_changes();
 }
 

@@ -33,7 +33,7 @@ LAYERS = {
     "filter/sources/cameras/frame_agreement.h": [],
     "filter/sources/wheels/": ["filter/sources/wheels/", *BELOW_SOURCES],
     "filter/sources/ground/": ["filter/sources/ground/", *BELOW_SOURCES],
-    "filter/sources/standstill/": ["filter/sources/standstill/", "filter/sources/cameras/frame_agreement.h", *BELOW_SOURCES],
+    "filter/sources/standstill/": ["filter/sources/standstill/", *BELOW_SOURCES],
     "filter/start/": ["filter/start/", *SOURCES, *BELOW_SOURCES, "filter/advice.h"],
     "filter/health/": ["filter/health/", "filter/ingest/", *RECORDS, "filter/advice.h", "include/ear/", "eigen", "freestanding"],
     "smoother/": ["smoother/", *FILTER, "include/ear/", "eigen", "ceres", "freestanding"],

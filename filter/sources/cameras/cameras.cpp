@@ -6,6 +6,7 @@
 #include "filter/ekf/initial_state.h"
 #include "filter/ekf/relative_motion.h"
 #include "filter/ingest/capacity.h"
+#include "filter/ingest/evidence.h"
 #include "filter/ingest/silence.h"
 
 namespace ear {

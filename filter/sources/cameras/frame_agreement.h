@@ -3,8 +3,6 @@
 
 namespace ear {
 
-/// Chosen: fewer features show too little of where the vehicle is.
-inline constexpr int kFewFeatures = 10;
 /// By definition, of features or readings.
 inline constexpr double kMajority = 0.5;
 

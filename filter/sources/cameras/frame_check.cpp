@@ -4,6 +4,7 @@
 #include <cmath>
 #include <vector>
 
+#include "filter/ingest/evidence.h"
 #include "filter/sources/cameras/triangulation.h"
 
 namespace ear {

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "filter/ingest/capacity.h"
-#include "filter/sources/cameras/frame_agreement.h"
+#include "filter/ingest/evidence.h"
 #include "filter/sources/cameras/parallax.h"
 
 namespace ear {

@@ -4,9 +4,9 @@
 #include <cmath>
 
 #include "filter/ingest/capacity.h"
+#include "filter/ingest/evidence.h"
 #include "filter/ingest/median.h"
 #include "filter/ingest/silence.h"
-#include "filter/sources/cameras/frame_agreement.h"
 
 namespace ear {
 namespace {
