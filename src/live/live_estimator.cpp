@@ -6,7 +6,6 @@
 #include <cerrno>
 #include <cmath>
 #include <ctime>
-#include <limits>
 #include <utility>
 
 namespace ear::live {
@@ -14,12 +13,10 @@ namespace {
 
 using SteadyClock = std::chrono::steady_clock;
 
-constexpr TimeNs kNever = std::numeric_limits<TimeNs>::min();
 constexpr std::chrono::milliseconds kPatience{100};    // with readings that belong before a frame and are not there
 constexpr std::chrono::milliseconds kNoSamples{500};   // a frame waits for inertial samples, at most
 constexpr std::chrono::milliseconds kLongestLook{10};  // that counts as waiting
 constexpr TimeNs kLongestHeld = 300'000'000;           // samples are handed over without a frame after this time
-constexpr TimeNs kDead = 500'000'000;                  // without a reading: the sensor is not waited for
 constexpr long kWakeNs = 5'000'000;                    // the thread looks again, whatever was missed
 
 TimeNs period(double rate_hz) { return std::llround(1e9 / rate_hz); }
@@ -118,6 +115,7 @@ void LiveEstimator::count_waiting() {
 
 /// One frame or one inertial sample; false: nothing can be done before more comes.
 bool LiveEstimator::advance() {
+  if (step_ns_) return take_step();
   const std::optional<TimeNs> frame_ns = queued_.next_frame_ns();
   if (!frame_ns) {
     waited_.reset();
@@ -135,13 +133,35 @@ bool LiveEstimator::advance() {
   return take_frame(*frame_ns);
 }
 
+/// For readings that belong before a frame or a step; a stream that was waited for in vain is not waited for again
+/// before it speaks.
+bool LiveEstimator::must_wait() {
+  if (stop_) return false;
+  Beside* const streams[] = {&encoder_, &laser_};
+  const auto owed = [this](const Beside* stream) { return is_owed(*stream); };
+  if (std::none_of(std::begin(streams), std::end(streams), owed)) return false;
+  if (!waited_) waited_.emplace(0);
+  if (*waited_ < kPatience) return true;
+  ++impatient_;
+  for (Beside* const stream : streams) {
+    if (owed(stream)) stream->given_up_ns = stream->newest_ns;
+  }
+  return false;
+}
+
+/// False: it stays, and waits for other sensors.
+bool LiveEstimator::take_step() {
+  if (must_wait()) return false;
+  waited_.reset();
+  handed_over_ns_ = *step_ns_;
+  report(queued_.step(*step_ns_), *step_ns_);
+  step_ns_.reset();
+  return true;
+}
+
 /// False: it stays, and waits for other sensors.
 bool LiveEstimator::take_frame(TimeNs frame_ns) {
-  if (!stop_ && (is_owed(encoder_) || is_owed(laser_))) {
-    if (!waited_) waited_.emplace(0);
-    if (*waited_ < kPatience) return false;
-    ++impatient_;
-  }
+  if (must_wait()) return false;
   QueuedFrame* const keep = listeners_.keep_frame ? listeners_.keep_frame() : nullptr;
   std::optional<Estimate> estimate;
   if (queued_.process(estimate, keep) == Progress::no_frame) {
@@ -162,8 +182,7 @@ void LiveEstimator::take_sample() {
   if (listeners_.on_imu) listeners_.on_imu(sample);
   if (queued_.next_frame_ns()) return;
   if (steps_.due(reached_ns_)) {
-    handed_over_ns_ = reached_ns_;
-    report(queued_.step(reached_ns_), reached_ns_);
+    step_ns_ = reached_ns_;
   } else if (std::abs(duration_ns(handed_over_ns_, reached_ns_)) > kLongestHeld) {
     handed_over_ns_ = reached_ns_;
     std::optional<Estimate> none;
@@ -174,9 +193,8 @@ void LiveEstimator::take_sample() {
 /// Is a reading on its way that is no later than the inertial samples? Stamps vary by a tenth of the period.
 bool LiveEstimator::is_owed(const Beside& stream) const {
   const TimeNs newest = stream.newest_ns;
-  if (stream.period_ns == 0 || newest == 0) return false;
-  const TimeNs age = duration_ns(newest, reached_ns_);
-  return age >= stream.period_ns - stream.period_ns / 10 && age < std::max(kDead, 5 * stream.period_ns);
+  if (stream.period_ns == 0 || newest == stream.given_up_ns) return false;
+  return newest == kNever || duration_ns(newest, reached_ns_) >= stream.period_ns - stream.period_ns / 10;
 }
 
 void LiveEstimator::report(std::optional<Estimate> estimate, TimeNs t_ns) {

@@ -1,8 +1,8 @@
 // The estimator of a live process: sensors' threads add samples, a thread of its own estimates.
 //
-// The order in which samples reach the estimator does not depend on how busy the machine is: a frame is handed over
-// once the inertial samples reach it, and the wheels' and beams' readings that are no later than these are there. So
-// the same samples from a recording give the same estimates, bit for bit.
+// The order in which samples reach the estimator does not depend on how busy the machine is: a frame, or a step
+// without images, is handed over once the inertial samples reach it, and the wheels' and beams' readings that are no
+// later than these are there. So the same samples from a recording give the same estimates, bit for bit.
 #pragma once
 
 #include <semaphore.h>
@@ -10,6 +10,7 @@
 #include <atomic>
 #include <chrono>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <thread>
@@ -64,21 +65,25 @@ class LiveEstimator {
   void stop();
 
   [[nodiscard]] Overflows overflows() const { return queued_.overflows(); }
-  /// Frames that did not wait any longer for readings of wheels or beams: the same samples from a recording may give
-  /// other last digits.
+  /// Frames and steps that did not wait any longer for readings of wheels or beams: the same samples from a recording
+  /// may give other last digits.
   [[nodiscard]] std::uint64_t impatient() const { return impatient_; }
 
  private:
+  static constexpr TimeNs kNever = std::numeric_limits<TimeNs>::min();
   /// A stream whose readings belong before the frames that are later.
   struct Beside {
-    std::atomic<TimeNs> newest_ns{0};  ///< IMU time
-    TimeNs period_ns = 0;              ///< 0: there is no such sensor
-    double time_offset = 0.0;          ///< [s] added to a stamp gives IMU time
+    std::atomic<TimeNs> newest_ns{kNever};  ///< IMU time
+    TimeNs period_ns = 0;                   ///< 0: there is no such sensor
+    double time_offset = 0.0;               ///< [s] added to a stamp gives IMU time
+    std::optional<TimeNs> given_up_ns;      ///< its newest reading as it was waited for in vain
   };
 
   void run();
   void count_waiting();
   [[nodiscard]] bool advance();
+  [[nodiscard]] bool must_wait();
+  [[nodiscard]] bool take_step();
   [[nodiscard]] bool take_frame(TimeNs frame_ns);
   void take_sample();
   void report(std::optional<Estimate> estimate, TimeNs t_ns);
@@ -90,9 +95,10 @@ class LiveEstimator {
   Beside encoder_, laser_;
   LiveListeners listeners_;
   BlindSteps steps_;
+  std::optional<TimeNs> step_ns_;                   ///< a step that is due
   TimeNs reached_ns_;                               ///< the newest inertial stamp taken
   TimeNs handed_over_ns_ = 0;                       ///< up to here samples were given to the estimator
-  std::optional<std::chrono::nanoseconds> waited_;  ///< so long a frame has waited for other sensors
+  std::optional<std::chrono::nanoseconds> waited_;  ///< so long a frame or step has waited for other sensors
   std::chrono::steady_clock::time_point looked_;    ///< when the thread last looked for samples
   std::atomic<std::uint64_t> impatient_{0};
   sem_t news_{};

@@ -7,6 +7,7 @@
 #include <condition_variable>
 #include <deque>
 #include <mutex>
+#include <thread>
 
 #include "tools/simulator/film.h"
 
@@ -33,6 +34,10 @@ class Reports {
   bool wait_for_frames(std::size_t count) {
     std::unique_lock lock(mutex_);
     return changed_.wait_for(lock, std::chrono::seconds(60), [&] { return frames_.size() >= count; });
+  }
+  [[nodiscard]] std::size_t count() {
+    const std::lock_guard lock(mutex_);
+    return frames_.size();
   }
   [[nodiscard]] const std::vector<LiveFrame>& frames() const { return frames_; }
   [[nodiscard]] int samples() const { return samples_; }
@@ -122,6 +127,38 @@ TEST_CASE("live: without cameras the wheels carry on, twenty times a second") {
   CHECK(reports.frames().size() == 60);
   CHECK(reports.frames().back().status == Status::tracking);
   CHECK(estimator.overflows().imu == 0);
+}
+
+TEST_CASE("live: a step without cameras waits for the wheels; for wheels that fell silent once") {
+  Calibration calibration;
+  calibration.encoder.emplace();
+  calibration.encoder->rate_hz = 200.0;
+  Reports reports;
+  LiveEstimator estimator(Config{}, calibration, {20.0, 4}, reports.listeners());
+  ImuSample sample;
+  sample.accel_B = {0.0, 0.0, 9.81};
+  sample.t_ns = 1'000'000'000;
+  const auto inertial_until = [&](TimeNs end_ns) {
+    for (; sample.t_ns < end_ns; sample.t_ns += 5'000'000) REQUIRE(estimator.add_imu(sample));
+  };
+  TimeNs wheels_ns = 1'000'000'000;
+  const auto wheels_until = [&](TimeNs end_ns) {
+    for (; wheels_ns < end_ns; wheels_ns += 5'000'000) REQUIRE(estimator.add_encoder({wheels_ns, 0, 0}));
+  };
+  wheels_until(2'000'000'000);
+  inertial_until(2'000'000'000);
+  REQUIRE(reports.wait_for_frames(20));
+
+  inertial_until(2'030'000'000);
+  std::this_thread::sleep_for(std::chrono::milliseconds(30));
+  CHECK(reports.count() == 20);
+  wheels_until(2'030'000'000);
+  REQUIRE(reports.wait_for_frames(21));
+  CHECK(estimator.impatient() == 0);
+
+  inertial_until(2'320'000'000);
+  REQUIRE(reports.wait_for_frames(27));
+  CHECK(estimator.impatient() == 1);
 }
 
 TEST_CASE("live: a flood is refused and counted; the estimator goes on") {
