@@ -28,6 +28,7 @@ Ekf::Ekf(const FilterConfig& config, const Calibration& calibration)
 void Ekf::start(const ImuState& x, const Eigen::VectorXd& sigma, bool scale_is_given) {
   running_ = true;
   state_.imu = x;
+  started_W_ = x.p_WB;
   turned_ = 0.0;
   turned_path_.setZero();
   covariance_.reset(sigma);
@@ -202,7 +203,7 @@ ImuErrorMatrix Ekf::ordinary_covariance(const UnseenScales& scales) const {
     P += J * J.transpose();
   };
   const Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
-  add(scales.length, Eigen::Vector3d::Zero(), x.v_W, x.p_WB);
+  add(scales.length, Eigen::Vector3d::Zero(), x.v_W, x.p_WB - started_W_);
   add(scales.turn, turned_ * up, turned_ * up.cross(x.v_W), up.cross(turned_path_));
   return P;
 }

@@ -34,9 +34,9 @@ struct GroundRows {
 };
 
 /// Standard deviations, relative, of scales that no sensor of the vehicle measures. They correct nothing, but count in
-/// the covariance of an estimate.
+/// the covariance of an estimate, from where the state started.
 struct UnseenScales {
-  double length = 0.0;  ///< of all lengths, by the wheels
+  double length = 0.0;  ///< of all lengths, by the wheels or by the lenses
   double turn = 0.0;    ///< of the gyroscope, about the vertical
 };
 
@@ -128,6 +128,7 @@ class Ekf {
   Eigen::Vector3d rate_B_ = Eigen::Vector3d::Zero();
   std::uint64_t next_frame_ = 0;
   BiasChanges bias_changes_;
+  Eigen::Vector3d started_W_ = Eigen::Vector3d::Zero();  ///< [m] here
   // Since the start: what one unit of the gyroscope's scale does to yaw [rad] and, turned by a right angle, to
   // position.
   double turned_ = 0.0;

@@ -238,8 +238,10 @@ void carry(const double* Phi, int rows, MutableMatrix M) {
   for (; i < rows; ++i) carry_rows<OneRow>(Phi, M.at + i, M.stride);
 }
 
-constexpr double kCountUp[4] = {0.0, 1.0, 2.0, 3.0};  // by definition
-inline Four count_up() { return load(kCountUp); }
+inline Four count_up() {
+  const double lanes[4] = {0.0, 1.0, 2.0, 3.0};
+  return load(lanes);
+}
 
 // The largest of pivots / scale that is above `negligible`; -1 if there is none. Of equal ones the first of its column
 // of four.

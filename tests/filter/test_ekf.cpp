@@ -188,6 +188,19 @@ TEST_CASE("ekf: inflated motion is about the body, inflated biases are each sens
   CHECK(after(err::b_a, err::b_a) == doctest::Approx(before(err::b_a, err::b_a) + 0.25));
 }
 
+TEST_CASE("ekf: a scale that nothing measures counts from where the state started") {
+  Ekf ekf = started();
+  const auto grown = [&ekf] {
+    return Eigen::VectorXd((ekf.ordinary_covariance({0.1, 0.0}) - ekf.ordinary_covariance({})).diagonal());
+  };
+  CHECK(grown().segment<3>(estimate_error::position).isZero());
+  CHECK(grown().segment<3>(estimate_error::velocity).isApprox(Eigen::Vector3d(0.01, 0.0, 0.0), 1e-9));
+  ekf.propagate(samples(), kStart + 500'000'000, {}, 0.0);
+  const Eigen::Vector3d way = ekf.state().imu.p_WB - Eigen::Vector3d(3.0, 2.0, 1.0);
+  REQUIRE(way.norm() > 0.4);
+  CHECK(grown().segment<3>(estimate_error::position).isApprox(0.01 * way.cwiseAbs2(), 1e-9));
+}
+
 TEST_CASE("ekf: what updates did to the biases is given once") {
   Ekf ekf = started();
   Eigen::MatrixXd H = Eigen::MatrixXd::Zero(1, err::clones);

@@ -167,6 +167,7 @@ bool Cameras::show_motion(const State& x) const {
 
 void Cameras::reset() {
   tracks_.clear();
+  track_update_.reset();
   window_.reset();
   compared_.t_ns = 0;
   if (last_) last_->clone.reset();

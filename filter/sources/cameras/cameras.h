@@ -60,6 +60,9 @@ class Cameras {
   /// The state is as well known as if features had updated it.
   void set_updated(TimeNs t_ns) { window_.set_updated(t_ns); }
 
+  /// Standard deviation, relative, of all lengths by errors of the lenses that no number of features averages out.
+  [[nodiscard]] double scale_sigma() const { return track_update_.lens_pattern().scale_sigma(); }
+
   /// The frame was used; the next one is compared with it.
   void remember(const FeatureFrame& frame, const Ekf& ekf);
   [[nodiscard]] const std::optional<LastImage>& last_image() const { return last_; }

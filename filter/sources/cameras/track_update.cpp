@@ -40,10 +40,12 @@ void TrackUpdate::update(const FeatureFrame& frame, bool oldest_goes, CameraUpda
   camera_poses(x, cameras_);
   for (const std::size_t i : selected_) {
     const bool used = add(tracks[i], ekf);
+    if (used) add_to_pattern(tracks[i], x.camera);
     ++(used ? records.statistics.features_used : records.statistics.features_rejected);
     if (records.outcomes != nullptr) records.outcomes->push_back({tracks[i].id, used});
     tracks[i].observations.clear();  // each observation is used once
   }
+  lens_pattern_.forget();
   log(ekf, records);
   information_.compress(kNegligible);
   if (information_.residual().size() > 0) {
@@ -102,6 +104,13 @@ bool TrackUpdate::add(const Track& track, const Ekf& ekf) {
   }
   return information_.add(observations_, config_.feature_sigma_px / focal_px_,
                           config_.huber_px / config_.feature_sigma_px, ekf.covariance().matrix(), ekf.gate());
+}
+
+/// The newest that both cameras saw: what is wrong with the others is much the same.
+void TrackUpdate::add_to_pattern(const Track& track, const CameraState& cameras) {
+  const auto& seen = track.observations;
+  const auto newest = std::find_if(seen.rbegin(), seen.rend(), [](const TrackObservation& o) { return o.has_right; });
+  if (newest != seen.rend()) lens_pattern_.add(newest->left, newest->right, cameras);
 }
 
 void TrackUpdate::add_observation(const State& x, int clone, std::size_t camera, const InverseDepthPoint& point,

@@ -11,6 +11,7 @@
 #include "filter/ekf/ekf.h"
 #include "filter/ekf/records.h"
 #include "filter/sources/cameras/feature_update.h"
+#include "filter/sources/cameras/lens_pattern.h"
 #include "filter/sources/cameras/tracks.h"
 
 namespace ear {
@@ -25,10 +26,14 @@ class TrackUpdate {
   void update(const FeatureFrame& frame, bool oldest_goes, CameraUpdate calibration, TrackTable& tracks, Ekf& ekf,
               Records& records);
 
+  [[nodiscard]] const LensPattern& lens_pattern() const { return lens_pattern_; }
+  void reset() { lens_pattern_.reset(); }
+
  private:
   void select(const FeatureFrame& frame, std::optional<std::uint64_t> oldest, const TrackTable& tracks);
   [[nodiscard]] bool continues(std::uint64_t id) const;
   bool add(const Track& track, const Ekf& ekf);
+  void add_to_pattern(const Track& track, const CameraState& cameras);
   void add_observation(const State& x, int clone, std::size_t camera, const InverseDepthPoint& point,
                        const Eigen::Vector2d& uv);
   void log(const Ekf& ekf, Records& records) const;
@@ -43,6 +48,7 @@ class TrackUpdate {
   double focal_px_;
   std::size_t camera_count_;
   std::array<Residuals, 2> residuals_;
+  LensPattern lens_pattern_;
   // Memory that is used again.
   FeatureInformation information_;
   std::vector<CameraPose> cameras_;
