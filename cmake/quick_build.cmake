@@ -1,9 +1,9 @@
 # A first build in less time: common headers are compiled once, and small sources several at a time. No source may rely on
-# what others include: the presets debug, asan, fuzz and tidy build without. EAR_QUICK_BUILD turns it off.
+# what others include: the presets debug, fuzz and tidy build without. EAR_QUICK_BUILD turns it off.
 option(EAR_QUICK_BUILD "Compile common headers once and small sources together; needs more care from caches of compilers" ON)
 
 # With Eigen the headers are 0.6 to 0.8 s of each source. One compiled header serves all libraries, since these are
-# compiled with the same flags; programs are not (-fPIE).
+# compiled with the same flags; programs are not (-fPIE), and the tests have their own (tests/doctest_main.cmake).
 if(EAR_QUICK_BUILD)
   # ccache (4.0 and later) takes part only where it may disregard that such a file holds macros and a time.
   if(CMAKE_CXX_COMPILER_LAUNCHER MATCHES "(^|/)ccache$")
@@ -16,9 +16,10 @@ if(EAR_QUICK_BUILD)
   target_compile_features(ear_precompiled PRIVATE cxx_std_17)
   set_target_properties(ear_precompiled PROPERTIES CXX_EXTENSIONS OFF POSITION_INDEPENDENT_CODE ON)
   target_link_libraries(ear_precompiled PRIVATE Eigen3::Eigen)
-  target_precompile_headers(ear_precompiled PRIVATE <Eigen/Cholesky> <Eigen/Core> <Eigen/Geometry> <Eigen/LU> <algorithm>
-                            <array> <cmath> <cstdint> <filesystem> <functional> <map> <memory> <optional> <stdexcept>
-                            <string> <utility> <variant> <vector>)
+  set(EAR_COMMON_HEADERS <Eigen/Cholesky> <Eigen/Core> <Eigen/Geometry> <Eigen/LU> <algorithm> <array> <cmath> <cstdint>
+                         <filesystem> <functional> <map> <memory> <optional> <stdexcept> <string> <utility> <variant>
+                         <vector>)
+  target_precompile_headers(ear_precompiled PRIVATE ${EAR_COMMON_HEADERS})
 endif()
 
 # One compiler takes five sources of this target: half the time where sources are wiring around headers of others. Names in

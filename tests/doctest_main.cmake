@@ -2,6 +2,15 @@ add_library(doctest_main OBJECT ${PROJECT_SOURCE_DIR}/tests/support/main.cpp)
 ear_target(doctest_main)
 target_link_libraries(doctest_main PUBLIC doctest::doctest)
 
+# The headers of all doctest programs, compiled once (cmake/quick_build.cmake).
+if(EAR_QUICK_BUILD)
+  file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/precompiled_tests.cpp CONTENT "// Its headers are what counts.\n")
+  add_executable(ear_precompiled_tests ${PROJECT_BINARY_DIR}/precompiled_tests.cpp)
+  ear_target(ear_precompiled_tests)
+  target_link_libraries(ear_precompiled_tests PRIVATE doctest_main Eigen3::Eigen)
+  target_precompile_headers(ear_precompiled_tests PRIVATE ${EAR_COMMON_HEADERS} <doctest/doctest.h>)
+endif()
+
 # What `tools/test --asan` builds and runs: the unit tests of these folders, their ctest label is `sanitized` too.
 set(EAR_SANITIZED_FOLDERS ear filter frontend recording ros2 rosbag2 odometry smoother evaluation view
     fuzz)
@@ -38,6 +47,9 @@ function(ear_test)
   target_link_libraries(${target} PRIVATE doctest_main ${arg_LIBRARIES})
   target_compile_definitions(${target} PRIVATE EAR_SOURCE_DIR="${PROJECT_SOURCE_DIR}"
                                                $<$<BOOL:${EAR_SANITIZE}>:EAR_SANITIZED>)
+  if(TARGET ear_precompiled_tests)
+    target_precompile_headers(${target} REUSE_FROM ear_precompiled_tests)
+  endif()
   add_test(NAME ${arg_NAME} COMMAND ${target} ${arg_ARGUMENTS})
   ear_register(${target} ${arg_NAME} ${arg_LABEL} ${arg_TIMEOUT})
   set_tests_properties(${arg_NAME} PROPERTIES SKIP_RETURN_CODE 77)  # see tests/support/skip.h
