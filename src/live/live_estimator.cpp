@@ -3,6 +3,7 @@
 #include <pthread.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cmath>
 #include <ctime>
@@ -137,9 +138,9 @@ bool LiveEstimator::advance() {
 /// before it speaks.
 bool LiveEstimator::must_wait() {
   if (stop_) return false;
-  Beside* const streams[] = {&encoder_, &laser_};
+  const std::array<Beside*, 2> streams = {&encoder_, &laser_};
   const auto owed = [this](const Beside* stream) { return is_owed(*stream); };
-  if (std::none_of(std::begin(streams), std::end(streams), owed)) return false;
+  if (std::none_of(streams.begin(), streams.end(), owed)) return false;
   if (!waited_) waited_.emplace(0);
   if (*waited_ < kPatience) return true;
   ++impatient_;
