@@ -2,13 +2,14 @@ add_library(doctest_main OBJECT ${PROJECT_SOURCE_DIR}/tests/support/main.cpp)
 ear_target(doctest_main)
 target_link_libraries(doctest_main PUBLIC doctest::doctest)
 
-# The headers of all doctest programs, compiled once (cmake/quick_build.cmake).
+# The headers of all doctest programs, compiled once (cmake/quick_build.cmake). Without doctest's own: glog, which comes
+# with Ceres, has a CHECK too, and the one that is included later counts.
 if(EAR_QUICK_BUILD)
   file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/precompiled_tests.cpp CONTENT "// Its headers are what counts.\n")
   add_executable(ear_precompiled_tests ${PROJECT_BINARY_DIR}/precompiled_tests.cpp)
   ear_target(ear_precompiled_tests)
   target_link_libraries(ear_precompiled_tests PRIVATE doctest_main Eigen3::Eigen)
-  target_precompile_headers(ear_precompiled_tests PRIVATE ${EAR_COMMON_HEADERS} <doctest/doctest.h>)
+  target_precompile_headers(ear_precompiled_tests PRIVATE ${EAR_COMMON_HEADERS})
 endif()
 
 # What `tools/test --asan` builds and runs: the unit tests of these folders, their ctest label is `sanitized` too. Those of
