@@ -131,13 +131,14 @@ class Live(unittest.TestCase):
             self.assertEqual(done.returncode, 0, done.stderr)
             self.assertIn("calibration: the whole estimate", done.stderr)
             self.assertEqual(run("run", root / "drive", "--out", root / "run").returncode, 0)
-            # What listens changes nothing, unless readings came so late that no frame waited for them.
-            if "; 0 frames did not wait" in done.stderr:
-                self.assertEqual((root / "live/estimate.tum").read_bytes(), (root / "run/estimate.tum").read_bytes())
             found = json.loads((root / "found/calibration.json").read_text(encoding="utf-8"))
             separation = [entry for entry in found["parameters"] if "separation" in entry["name"]]
             self.assertEqual(len(separation), 1)
             self.assertTrue((root / "found/encoder0/sensor.yaml").is_file())
+            # What listens changes nothing.
+            if "; 0 frames did not wait" not in done.stderr:
+                self.skipTest("the machine was so slow that readings came late, which may change the last digits")
+            self.assertEqual((root / "live/estimate.tum").read_bytes(), (root / "run/estimate.tum").read_bytes())
 
     def test_not_with_a_view(self):
         done = run("live", "--sensors", "/", "--calibrate", "x", "--check")

@@ -1,5 +1,5 @@
-// Errors of the lenses that no state describes stay at their place in the image: no number of features averages them
-// out, as the filter takes it to. What they may do to lengths counts in the estimate's covariance.
+// Errors of the lenses that no state describes stay at their place in the image, and no number of features averages
+// them out. They are measured here; what they may do to lengths counts in the estimate's covariance.
 // docs/decisions/0040-errors-that-do-not-average.md.
 #pragma once
 
