@@ -12,21 +12,25 @@ namespace {
 constexpr int kKnots = 20;          // places along the way, so that white noise is averaged and lasting slip is not
 constexpr double kWindow = 0.5;     // of the distance between two knots, that a knot is the mean of
 constexpr int kFewestKnots = 10;    // that have something in their window
-constexpr int kShares = 50;         // of the variance at the end of the way that are tried
+constexpr int kShares = 50;         // of the variance that the walk brings between two knots, that are tried
 constexpr double kShortest = 0.01;  // [m] of an interval: below, the direction is not known
 
+/// Means over a window about each knot.
 struct Knots {
   std::vector<double> way, ahead;
+  std::vector<double> length;  ///< [m] of the window: half as much at both ends of the way
+  std::vector<double> count;   ///< in the window
+  double apart = 0.0;          ///< [m]
 };
 
 Knots means_at_knots(const std::vector<Ahead>& along) {
-  const double apart = (along.back().way - along.front().way) / kKnots;
   Knots knots;
+  knots.apart = (along.back().way - along.front().way) / kKnots;
   for (int k = 0; k <= kKnots; ++k) {
-    const double centre = along.front().way + k * apart;
+    const double centre = along.front().way + k * knots.apart;
     double way = 0.0, ahead = 0.0, count = 0.0;
     for (const Ahead& at : along) {
-      if (std::abs(at.way - centre) > 0.5 * kWindow * apart) continue;
+      if (std::abs(at.way - centre) > 0.5 * kWindow * knots.apart) continue;
       way += at.way;
       ahead += at.ahead;
       count += 1.0;
@@ -34,8 +38,30 @@ Knots means_at_knots(const std::vector<Ahead>& along) {
     if (count == 0.0) continue;
     knots.way.push_back(way / count);
     knots.ahead.push_back(ahead / count);
+    knots.length.push_back((k == 0 || k == kKnots ? 0.5 : 1.0) * kWindow * knots.apart);
+    knots.count.push_back(count);
   }
   return knots;
+}
+
+/// Covariance of the knots by a walk of variance 1 over the distance of two knots. The mean of a walk over a window of
+/// length L about s has the variance s - L / 6; windows do not overlap.
+Eigen::MatrixXd walk_covariance(const Knots& knots, double start) {
+  const auto n = static_cast<Eigen::Index>(knots.way.size());
+  const Eigen::VectorXd s = (Eigen::Map<const Eigen::VectorXd>(knots.way.data(), n).array() - start) / knots.apart;
+  Eigen::MatrixXd V(n, n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    for (Eigen::Index j = 0; j < n; ++j) V(i, j) = std::min(s(i), s(j));
+  }
+  V.diagonal() -= Eigen::Map<const Eigen::VectorXd>(knots.length.data(), n) / (6.0 * knots.apart);
+  return V;
+}
+
+/// Covariance of the knots by white noise that has the variance 1 in the mean of a whole window.
+Eigen::MatrixXd noise_covariance(const Knots& knots) {
+  const auto n = static_cast<Eigen::Index>(knots.count.size());
+  const Eigen::Map<const Eigen::VectorXd> count(knots.count.data(), n);
+  return (count.maxCoeff() * count.cwiseInverse()).asDiagonal();
 }
 
 /// Of a line with errors whose covariance is `V` but for its size.
@@ -111,25 +137,19 @@ std::optional<double> walk_along(const std::vector<Ahead>& along) {
   const Knots knots = means_at_knots(along);
   const auto n = static_cast<Eigen::Index>(knots.way.size());
   if (n < kFewestKnots) return std::nullopt;
-  const double length = knots.way.back() - knots.way.front();
   const Eigen::VectorXd y = Eigen::Map<const Eigen::VectorXd>(knots.ahead.data(), n);
-  const Eigen::VectorXd s =
-      (Eigen::Map<const Eigen::VectorXd>(knots.way.data(), n).array() - knots.way.front()) / length;
   Eigen::MatrixXd X(n, 2);
-  X << Eigen::VectorXd::Ones(n), s;
-  Eigen::MatrixXd walked(n, n);
-  for (Eigen::Index i = 0; i < n; ++i) {
-    for (Eigen::Index j = 0; j < n; ++j) walked(i, j) = std::min(s(i), s(j));
-  }
+  X << Eigen::VectorXd::Ones(n), Eigen::Map<const Eigen::VectorXd>(knots.way.data(), n) / knots.apart;
+  const Eigen::MatrixXd walked = walk_covariance(knots, along.front().way), noise = noise_covariance(knots);
   double best = -std::numeric_limits<double>::infinity(), walk = 0.0;
-  for (int k = 0; k < kShares; ++k) {
+  for (int k = 0; k <= kShares; ++k) {
     const double share = k / static_cast<double>(kShares);
-    const Fit fit = fit_line(X, y, share * walked + (1.0 - share) * Eigen::MatrixXd::Identity(n, n));
+    const Fit fit = fit_line(X, y, share * walked + (1.0 - share) * noise);
     if (!(fit.log_likelihood > best)) continue;
     best = fit.log_likelihood;
-    walk = share * fit.variance / length;
+    walk = share * fit.variance / knots.apart;
   }
-  return std::sqrt(walk / (1.0 - kWindow / 3.0));  // means over a window differ by less than the walk did
+  return std::sqrt(walk);
 }
 
 std::optional<double> common_slip(const Batch& batch, std::size_t segment, const RollSetting& setting) {

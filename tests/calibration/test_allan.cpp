@@ -4,9 +4,11 @@
 #include <random>
 
 #include "calibration/allan.h"
+#include "tests/support/about.h"
 
 using namespace ear;
 using namespace ear::calibration;
+using ear::test::about;
 
 namespace {
 
@@ -32,7 +34,7 @@ TEST_CASE("allan: white noise is found within its uncertainty, and no walk is cl
     CAPTURE(seed);
     const AllanResult found = allan(signal_of(seed, 60.0, 1e-3, 0.0), kInterval);
     REQUIRE(found.white);
-    CHECK(found.white->value == doctest::Approx(1e-3).epsilon(0.1).scale(0.0));
+    CHECK(found.white->value == about(1e-3, 0.1));
     squares += std::pow((found.white->value - 1e-3) / found.white->sigma, 2) / 20.0;
     CHECK_FALSE(found.random_walk);
     CHECK(found.walk_below > 0.0);
@@ -48,10 +50,10 @@ TEST_CASE("allan: a random walk is found where the recording is long enough, and
     REQUIRE(found.random_walk);
     CHECK(std::abs(found.random_walk->value - 1e-4) < 4.0 * found.random_walk->sigma);
     mean += found.random_walk->value / 10.0;
-    CHECK(found.white->value == doctest::Approx(1e-3).epsilon(0.1).scale(0.0));
+    CHECK(found.white->value == about(1e-3, 0.1));
     CHECK_FALSE(allan(signal_of(seed, 5.0, 1e-3, 1e-4), kInterval).random_walk);
   }
-  CHECK(mean == doctest::Approx(1e-4).epsilon(0.1).scale(0.0));
+  CHECK(mean == about(1e-4, 0.1));
 }
 
 TEST_CASE("allan: the stretch at rest is the one that neither moves nor shakes") {
@@ -69,8 +71,8 @@ TEST_CASE("allan: the stretch at rest is the one that neither moves nor shakes")
     imu.push_back(sample);
   }
   const ImuNoise noise = noise_at_rest(imu);
-  CHECK(noise.duration == doctest::Approx(15.0).epsilon(0.05));
-  for (const AllanResult& axis : noise.axes) CHECK(axis.white->value == doctest::Approx(1e-3).epsilon(0.1).scale(0.0));
+  CHECK(noise.duration == about(15.0, 0.05));
+  for (const AllanResult& axis : noise.axes) CHECK(axis.white->value == about(1e-3, 0.1));
   imu.resize(120);
   CHECK_THROWS_WITH(static_cast<void>(noise_at_rest(imu)), doctest::Contains("s at most"));
 }
@@ -102,10 +104,10 @@ TEST_CASE("noise in motion: what rotors add is told from the motion itself") {
     CAPTURE(times);
     const std::vector<ImuSample> imu = swinging(4, times, 2.0 * times, 10.0);
     const MotionNoise found = noise_in_motion(noise_at_rest(imu), imu);
-    CHECK(found.duration == doctest::Approx(10.0).epsilon(0.06));
+    CHECK(found.duration == about(10.0, 0.06));
     for (std::size_t axis = 0; axis < 6; ++axis) {
       CAPTURE(axis);
-      CHECK(found.times[axis].value == doctest::Approx(axis < 3 ? times : 2.0 * times).epsilon(0.15));
+      CHECK(found.times[axis].value == about(axis < 3 ? times : 2.0 * times, 0.15));
       CHECK(found.times[axis].sigma < 0.12 * found.times[axis].value);
     }
   }

@@ -7,12 +7,14 @@
 
 #include "calibration/board.h"
 #include "tests/smoother/support.h"
+#include "tests/support/about.h"
 #include "tools/calibration/board_start.h"
 #include "tools/simulator/lens.h"
 #include "tools/simulator/vehicle.h"
 
 using namespace ear;
 using namespace ear::calibration;
+using ear::test::about;
 
 namespace {
 
@@ -126,7 +128,7 @@ TEST_CASE("board: both lens models from nothing, with errors of the size that is
       }
       CHECK(std::abs(error[0]) < 0.3);
       CHECK(std::abs(error[2]) < 0.3);
-      CHECK(result.sigma_px == doctest::Approx(kNoise).epsilon(0.1));
+      CHECK(result.sigma_px == about(kNoise, 0.1));
       CHECK_FALSE(says(result.advice, "tilted"));
       CHECK_FALSE(says(result.advice, "not shown"));
     }

@@ -5,9 +5,11 @@
 #include <cmath>
 
 #include "filter/ekf/so3.h"
+#include "tests/support/about.h"
 
 using namespace ear;
 using namespace ear::calibration;
+using ear::test::about;
 
 namespace {
 
@@ -67,9 +69,9 @@ TEST_CASE("bridge: inertial samples carry the states over a hop, and the next pi
       CHECK((bridged[i].state.p_WB - bridged[i - 1].state.p_WB).norm() < 0.45);
       highest = std::max(highest, bridged[i].state.p_WB.z());
     }
-    CHECK(highest - kStart.z() == doctest::Approx(2.0 * 2.0 * std::pow(kHop / 6.2832, 2)).epsilon(0.1));
+    CHECK(highest - kStart.z() == about(2.0 * 2.0 * std::pow(kHop / 6.2832, 2), 0.1));
     const NavState& last = bridged.back().state;
-    CHECK(last.p_WB.z() == doctest::Approx(kStart.z()).epsilon(1e-3));
+    CHECK(last.p_WB.z() == about(kStart.z(), 1e-3));
     CHECK((last.p_WB - kStart).norm() < 0.01 + 20.0 * bias);  // 5 s of a wrong force
     CHECK(last.v_W.norm() < 1e-9);
     const Eigen::Vector3d turned = log_so3(last.q_WB.toRotationMatrix());

@@ -1,5 +1,6 @@
 // Slip of both wheels alike, as a random walk beside white noise.
 #include "calibration/common_slip.h"
+#include "tests/support/about.h"
 
 #include <doctest/doctest.h>
 
@@ -7,6 +8,7 @@
 #include <random>
 
 using namespace ear::calibration;
+using ear::test::about;
 
 namespace {
 
@@ -46,10 +48,10 @@ double found(const Drawn& drawn) {
 TEST_CASE("common slip: a random walk is found beside an offset, a wrong scale and white noise") {
   Drawn drawn;
   drawn.walk = 0.01;
-  CHECK(found(drawn) == doctest::Approx(0.01).epsilon(0.12));
+  CHECK(found(drawn) == about(0.01, 0.12));
   drawn.white = 0.5;
   drawn.walk = 0.05;
-  CHECK(found(drawn) == doctest::Approx(0.05).epsilon(0.12));
+  CHECK(found(drawn) == about(0.05, 0.12));
 }
 
 TEST_CASE("common slip: white noise alone is hardly taken for a walk") {

@@ -12,10 +12,12 @@
 #include "calibration/calibrate.h"
 #include "filter/ekf/so3.h"
 #include "tests/smoother/support.h"
+#include "tests/support/about.h"
 #include "tools/calibration/simulated_drive.h"
 
 using namespace ear;
 using namespace ear::calibration;
+using ear::test::about;
 
 namespace {
 
@@ -249,9 +251,9 @@ TEST_CASE("calibrate: wheels and beams of a vehicle of another physics") {
   CHECK(result.findings.size() == 25);
   const EncoderCalibration& encoder = *result.calibration.encoder;
   for (std::size_t side = 0; side < 2; ++side) {
-    CHECK(encoder.wheel_radius[side] == doctest::Approx(truth.encoder->wheel_radius[side]).epsilon(0.003));
+    CHECK(encoder.wheel_radius[side] == about(truth.encoder->wheel_radius[side], 0.003));
   }
-  CHECK(encoder.track_width == doctest::Approx(truth.encoder->track_width).epsilon(0.003));
+  CHECK(encoder.track_width == about(truth.encoder->track_width, 0.003));
   for (std::size_t k = 0; k < kBeams.size(); ++k) {
     const Eigen::Vector3d& found = result.calibration.lasers->beams[k].d_B;
     CHECK(std::asin(found.cross(truth.lasers->beams[k].d_B).norm()) < 0.1 * kDegree);

@@ -3,10 +3,13 @@
 #include <stdexcept>
 
 #include "tests/evaluation/support.h"
+#include "tests/support/about.h"
 #include "tools/evaluation/evaluate.h"
 
 namespace ear::evaluation {
 namespace {
+
+using test::about;
 
 Estimate estimate_of(const Trajectory& poses) {
   Estimate estimate;
@@ -67,9 +70,9 @@ TEST_CASE("evaluate: white noise of known size gives its size back") {
     pose.q_WB = exp_rotation(gaussian(rng, 0.02)) * pose.q_WB;
   }
   const Evaluation result = evaluate(estimate_of(poses), walk(100.0, 50.0), AlignmentKind::none);
-  CHECK(result.position_rmse == doctest::Approx(0.05 * std::sqrt(3.0)).epsilon(0.03));
-  CHECK(result.z_rmse == doctest::Approx(0.05).epsilon(0.03).scale(0.0));
-  CHECK(result.rotation_rmse == doctest::Approx(0.02 * std::sqrt(3.0)).epsilon(0.03));
+  CHECK(result.position_rmse == about(0.05 * std::sqrt(3.0), 0.03));
+  CHECK(result.z_rmse == about(0.05, 0.03));
+  CHECK(result.rotation_rmse == about(0.02 * std::sqrt(3.0), 0.03));
 }
 
 TEST_CASE("evaluate: a scale error is the same share of every stretch, a turning world the same angle per metre") {
@@ -116,7 +119,7 @@ TEST_CASE("length: neither noise nor the rate of the truth add to it") {
   std::mt19937_64 rng{22};
   Trajectory noisy = drive(10.0, 500.0);  // steps of 2 mm under noise of 5 mm: their sum would be 45 m
   for (Pose& pose : noisy) pose.p_WB += gaussian(rng, 0.005);
-  CHECK(distance_travelled(noisy, noisy).back() == doctest::Approx(10.0).epsilon(0.02));
+  CHECK(distance_travelled(noisy, noisy).back() == about(10.0, 0.02));
 
   Trajectory standing = drive(10.0, 500.0);
   for (Pose& pose : standing) pose.p_WB = gaussian(rng, 0.01);
@@ -184,8 +187,8 @@ TEST_CASE("NEES: errors drawn from the stated covariance are chi-squared of 3 de
 TEST_CASE("NEES: believing half the error makes it four times as large") {
   const Trajectory truth = walk(400.0, 10.0);
   const Evaluation result = evaluate(consistent_estimate(truth, 0.5, 32), truth, AlignmentKind::yaw);
-  CHECK(result.nees->position.mean == doctest::Approx(12.0).epsilon(0.05));
-  CHECK(result.nees->orientation.mean == doctest::Approx(12.0).epsilon(0.05));
+  CHECK(result.nees->position.mean == about(12.0, 0.05));
+  CHECK(result.nees->orientation.mean == about(12.0, 0.05));
   CHECK(result.nees->position.inside < 0.7);
 }
 

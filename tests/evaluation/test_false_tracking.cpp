@@ -4,11 +4,14 @@
 #include <string>
 
 #include "tests/evaluation/support.h"
+#include "tests/support/about.h"
 #include "tools/evaluation/evaluate.h"
 #include "tools/evaluation/read.h"
 
 namespace ear::evaluation {
 namespace {
+
+using test::about;
 
 constexpr double kRate = 10.0;       // [Hz] of estimate and truth
 constexpr double kDuration = 100.0;  // [s]
@@ -63,7 +66,7 @@ TEST_CASE("false tracking: an error that grows is counted from where it is beyon
     const double t = seconds_between(kStart, pose.t_ns);
     pose.p_WB.y() += 0.2 * std::max(0.0, t - 30.0);  // 5 % of the path at 40 s
   }
-  CHECK(judged(estimate).share == doctest::Approx(0.6).epsilon(0.01));
+  CHECK(judged(estimate).share == about(0.6, 0.01));
   CHECK(judged(estimate).stretches.front().travelled == doctest::Approx(100.0));
 }
 
@@ -142,13 +145,13 @@ TEST_CASE("false tracking: a truth of positions alone") {
   }
   truth.error = 0.8;
   const Evaluation sound = evaluate(off_to_the_side(0.0, 0.0, 0.0), truth, AlignmentKind::yaw);
-  CHECK(sound.length == doctest::Approx(100.0).epsilon(0.05));
+  CHECK(sound.length == about(100.0, 0.05));
   CHECK(sound.position_rmse < 0.2);
   CHECK(sound.relative.empty());
   CHECK_FALSE(sound.rotation_from_attitude);
   CHECK(sound.nees->position.mean > 3.0);
   CHECK(sound.false_tracking->stretches.empty());
-  CHECK(judged(off_to_the_side(3.0, 50.0, 60.0), truth).share == doctest::Approx(0.10).epsilon(0.05));
+  CHECK(judged(off_to_the_side(3.0, 50.0, 60.0), truth).share == about(0.10, 0.05));
 }
 
 TEST_CASE("positions alone are read from a csv with fewer than eight columns") {

@@ -1,9 +1,12 @@
 #include <doctest/doctest.h>
 
+#include "tests/support/about.h"
 #include "tools/experiments/figures.h"
 
 namespace ear::experiments {
 namespace {
+
+using test::about;
 
 simulator::Simulation simulate(double duration) {
   simulator::Options options;
@@ -19,7 +22,7 @@ TEST_CASE("figures: of a short drive") {
   REQUIRE(figures.ate_rmse);
   CHECK(*figures.ate_rmse > 1e-5);
   CHECK(*figures.ate_rmse < 0.05);
-  CHECK(*figures.length == doctest::Approx(simulation.path_length()).epsilon(0.02));
+  CHECK(*figures.length == about(simulation.path_length(), 0.02));
   CHECK(*figures.ate_percent == doctest::Approx(100.0 * *figures.ate_rmse / *figures.length));
   CHECK(*figures.z_rmse_ground == doctest::Approx(*figures.z_rmse));  // flat1 never flies
   CHECK(*figures.coverage > 90.0);

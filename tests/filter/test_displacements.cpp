@@ -7,6 +7,7 @@
 #include "filter/ekf/imu_displacement.h"
 #include "filter/ekf/propagation.h"
 #include "filter/sources/wheels/wheels.h"
+#include "tests/support/about.h"
 #include "tests/support/check_jacobian.h"
 #include "tests/support/random_state.h"
 
@@ -132,7 +133,7 @@ TEST_CASE("displacements: the IMU's noise spreads it as its covariance says") {
     const ImuBuffer samples = random_samples(rng, x, sample_noise);
     squares += (imu_motion(x.imu, samples, kEnd, noise).p_BiBj - clean.p_BiBj).squaredNorm() / kRuns;
   }
-  CHECK(squares == doctest::Approx(clean.covariance.trace()).epsilon(0.1));
+  CHECK(squares == about(clean.covariance.trace(), 0.1));
 }
 
 TEST_CASE("displacements: a strike among the samples makes the IMU's uncertain") {
@@ -166,7 +167,7 @@ TEST_CASE("displacements: the covariance of the IMU's follows from the state's (
   const auto displacement = [&](const State& state) {
     return imu_displacement(imu_motion(state.imu, samples, kEnd, none), P);
   };
-  CHECK(mean_chi_squared(rng, x, sigma, displacement(x), displacement) == doctest::Approx(3.0).epsilon(0.1));
+  CHECK(mean_chi_squared(rng, x, sigma, displacement(x), displacement) == about(3.0, 0.1));
 }
 
 TEST_CASE("displacements: the covariance of the wheels' follows from the state's (2000 draws)") {
@@ -189,7 +190,7 @@ TEST_CASE("displacements: the covariance of the wheels' follows from the state's
       return by_wheels(state, P, WheelIncrements({}, turns), samples, kEnd, on_plane);
     };
     REQUIRE(displacement(x).available);
-    CHECK(mean_chi_squared(rng, x, sigma, displacement(x), displacement) == doctest::Approx(3.0).epsilon(0.1));
+    CHECK(mean_chi_squared(rng, x, sigma, displacement(x), displacement) == about(3.0, 0.1));
   }
 }
 

@@ -6,8 +6,10 @@
 #include <cmath>
 
 #include "filter/ekf/propagation.h"
+#include "tests/support/about.h"
 
 using namespace ear;
+using ear::test::about;
 
 namespace {
 
@@ -92,7 +94,7 @@ TEST_CASE("ekf: a factor of two makes the accelerometer's noise twice as large")
     return ekf.covariance().matrix()(err::nu, err::nu);
   };
   const double noise = Calibration{}.imu.accel_noise;
-  CHECK(grown(2.0) - grown(1.0) == doctest::Approx(3.0 * noise * noise).epsilon(0.01));  // 4 - 1, over one second
+  CHECK(grown(2.0) - grown(1.0) == about(3.0 * noise * noise, 0.01));  // 4 - 1, over one second
 }
 
 TEST_CASE("ekf: a clipped sample is reported with the time from which on the state is uncertain") {
@@ -224,8 +226,7 @@ TEST_CASE("ekf: at the start both wheels are known apart better than alike") {
   const Eigen::Matrix2d P = ekf.covariance().matrix().block<2, 2>(err::wheel_radius, err::wheel_radius);
   const Eigen::RowVector2d apart(1.0, -1.0), mean(0.5, 0.5);
   CHECK(std::sqrt((apart * P * apart.transpose()).value()) < std::sqrt(2.0) * config.prior.wheel_apart);
-  CHECK(std::sqrt((mean * P * mean.transpose()).value()) ==
-        doctest::Approx(config.prior.wheel_radius / std::sqrt(2.0)).epsilon(0.01));
+  CHECK(std::sqrt((mean * P * mean.transpose()).value()) == about(config.prior.wheel_radius / std::sqrt(2.0), 0.01));
 }
 
 TEST_CASE("ekf: at the start the product of baseline and focal length is known, each of them less well") {

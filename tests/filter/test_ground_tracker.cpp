@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "filter/sources/ground/ground_tracker.h"
+#include "tests/support/about.h"
 #include "tests/support/flat_ground.h"
 
 using namespace ear;
@@ -97,7 +98,7 @@ TEST_CASE("ground tracker: a floor that is suddenly another one is found again")
   Flight flight;
   for (int i = 0; i < 50; ++i) flight.step(1.0);
   for (int i = 0; i < 6; ++i) flight.step(0.4);  // over a table
-  CHECK(flight.tracker.height() == doctest::Approx(0.4).epsilon(0.05));
+  CHECK(flight.tracker.height() == about(0.4, 0.05));
 }
 
 TEST_CASE("ground tracker: without readings it does not know, and afterwards it does again") {
@@ -105,6 +106,6 @@ TEST_CASE("ground tracker: without readings it does not know, and afterwards it 
   for (int i = 0; i < 50; ++i) flight.step(1.0);
   for (int i = 0; i < 100; ++i) flight.step(6.0);  // too high for the beams
   for (int i = 0; i < 6; ++i) flight.step(2.0);
-  CHECK(flight.tracker.height() == doctest::Approx(2.0).epsilon(0.02));
+  CHECK(flight.tracker.height() == about(2.0, 0.02));
   CHECK(flight.tracker.height_sigma() < 0.02);
 }

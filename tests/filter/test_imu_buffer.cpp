@@ -5,8 +5,10 @@
 #include <random>
 
 #include "filter/ingest/imu_buffer.h"
+#include "tests/support/about.h"
 
 using namespace ear;
+using ear::test::about;
 
 namespace {
 
@@ -85,8 +87,8 @@ TEST_CASE("imu buffer: the density of white noise, whatever the rate and the dri
       buffer.push({static_cast<TimeNs>(1e9 * t), drift + noise(2e-3), drift + noise(3e-2)});
     }
     const ImuStatistics s = buffer.statistics(0, 20'000'000'000);
-    CHECK(s.gyro_density == doctest::Approx(2e-3).epsilon(0.06).scale(0.0));
-    CHECK(s.accel_density == doctest::Approx(3e-2).epsilon(0.06).scale(0.0));
+    CHECK(s.gyro_density == about(2e-3, 0.06));
+    CHECK(s.accel_density == about(3e-2, 0.06));
   }
 }
 

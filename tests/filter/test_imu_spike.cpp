@@ -7,8 +7,10 @@
 #include <utility>
 
 #include "filter/ingest/ingest.h"
+#include "tests/support/about.h"
 
 using namespace ear;
+using ear::test::about;
 
 namespace {
 
@@ -151,7 +153,7 @@ TEST_CASE("imu spike: strikes of 10 to 50 ms are not taken for one") {
         for (std::size_t i = 0; i < stream.samples().size(); ++i) {
           left += stream.dt() * (stream.samples()[i].accel_B.z() - kGravity);
         }
-        CHECK(left == doctest::Approx(60.0 * duration * 2.0 / M_PI).epsilon(0.15));
+        CHECK(left == about(60.0 * duration * 2.0 / M_PI, 0.15));
       }
     }
   }

@@ -9,8 +9,10 @@
 #include <string>
 
 #include "filter/ekf/ekf.h"
+#include "tests/support/about.h"
 
 using namespace ear;
+using ear::test::about;
 
 namespace {
 
@@ -87,8 +89,8 @@ TEST_CASE("initial state: mean and difference of the wheel radii are as well kno
     ekf.start(ImuState{}, sigma);
     const Eigen::Matrix2d P = ekf.covariance().matrix().block<2, 2>(err::wheel_radius, err::wheel_radius);
     const Eigen::RowVector2d apart(0.08, -0.08), mean(0.04, 0.04);  // [m] of what is relative
-    CHECK(std::sqrt((mean * P * mean.transpose()).value()) == doctest::Approx(8e-4).epsilon(1e-3).scale(0.0));
-    CHECK(std::sqrt((apart * P * apart.transpose()).value()) == doctest::Approx(difference).epsilon(1e-3));
+    CHECK(std::sqrt((mean * P * mean.transpose()).value()) == about(8e-4, 1e-3));
+    CHECK(std::sqrt((apart * P * apart.transpose()).value()) == about(difference, 1e-3));
   }
 }
 
@@ -99,7 +101,7 @@ TEST_CASE("initial state: an IMU that is slow has no gap between its samples") {
     CHECK(settings_for(FilterConfig{}, calibration).max_imu_gap == FilterConfig{}.max_imu_gap);
   }
   calibration.imu.rate_hz = 16.0;
-  CHECK(settings_for(FilterConfig{}, calibration).max_imu_gap == doctest::Approx(0.156).epsilon(0.01));
+  CHECK(settings_for(FilterConfig{}, calibration).max_imu_gap == about(0.156, 0.01));
 }
 
 TEST_CASE("initial state: standard deviations that cannot be are named") {

@@ -3,6 +3,7 @@
 #include <random>
 
 #include "filter/ekf/propagation.h"
+#include "tests/support/about.h"
 #include "tests/support/check_jacobian.h"
 #include "tests/support/random_state.h"
 
@@ -150,6 +151,6 @@ TEST_CASE(
     x.R_WB = exp_so3({draw(rng), draw(rng), 0.0});
     squares += motion_at(x.t_ns - 400'000'000, x, samples).v_W.head<2>().squaredNorm() / 2.0;
   }
-  CHECK(taken_back_sigma(tilt, delay) == doctest::Approx(std::sqrt(squares / draws)).epsilon(0.05));
+  CHECK(taken_back_sigma(tilt, delay) == about(std::sqrt(squares / draws), 0.05));
   CHECK(taken_back_sigma(tilt, -delay) == 0.0);
 }

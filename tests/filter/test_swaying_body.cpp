@@ -8,8 +8,10 @@
 
 #include "filter/ekf/so3.h"
 #include "filter/filter.h"
+#include "tests/support/about.h"
 
 using namespace ear;
+using ear::test::about;
 
 namespace {
 
@@ -144,7 +146,7 @@ TEST_CASE("swaying body: the wheels stay as large as the calibration says, and a
   car.wheel_factor = 1.01;
   const Outcome larger = drive(car, 932);
   CHECK(larger.radius == doctest::Approx(kRadius).epsilon(1e-6));
-  CHECK(larger.position.norm() / right.position.norm() == doctest::Approx(1.0 / 1.01).epsilon(1e-3));
+  CHECK(larger.position.norm() / right.position.norm() == about(1.0 / 1.01, 1e-3));
 
   FilterConfig sure;
   sure.prior.wheel_scale = 0.0;

@@ -10,9 +10,12 @@
 #include "frontend/image_pyramid.h"
 #include "frontend/reference_patch.h"
 #include "scene.h"
+#include "tests/support/about.h"
 
 namespace ear {
 namespace {
+
+using test::about;
 
 // The image moved so that what was at x is at A x + t; sharp texture, interpolated well.
 cv::Mat warped(const cv::Mat& image, const Eigen::Matrix2f& affine, const Eigen::Vector2f& shift) {
@@ -113,8 +116,8 @@ TEST_CASE("patch: a step that only noise makes has a chi-square of one for each 
         ++count;
       }
     }
-    CHECK(position / static_cast<float>(count) == doctest::Approx(2.0).epsilon(0.25));
-    CHECK(affine / static_cast<float>(count) == doctest::Approx(6.0).epsilon(0.25));
+    CHECK(position / static_cast<float>(count) == about(2.0, 0.25));
+    CHECK(affine / static_cast<float>(count) == about(6.0, 0.25));
   }
 }
 

@@ -15,6 +15,7 @@
 #include "src/live/ros_sensors.h"
 #include "tests/live/fast_dds_vehicle.h"
 #include "tests/live/live_setup.h"
+#include "tests/support/about.h"
 
 using namespace ear;
 using namespace ear::live;
@@ -22,6 +23,7 @@ using namespace ear::live;
 namespace {
 
 using namespace std::chrono_literals;
+using ear::test::about;
 using SteadyClock = std::chrono::steady_clock;
 
 constexpr auto kAtOnce = 1s;  // within which all is named
@@ -287,12 +289,12 @@ TEST_CASE("ros faults: a clock that is set is named, for each sensor") {
   vehicle.imu_ahead_ns = 5'000'000'000;
   CHECK(play_until(
             vehicle, ear, [&] { return clock_step(ear) > 0.0; }, kAtOnce) < kAtOnce);
-  CHECK(clock_step(ear) == doctest::Approx(5.0).epsilon(0.05));
+  CHECK(clock_step(ear) == about(5.0, 0.05));
   ear.said.clear();
   vehicle.imu_ahead_ns = -2'000'000'000;
   CHECK(play_until(
             vehicle, ear, [&] { return clock_step(ear) < 0.0; }, kAtOnce) < kAtOnce);
-  CHECK(clock_step(ear) == doctest::Approx(-7.0).epsilon(0.05));
+  CHECK(clock_step(ear) == about(-7.0, 0.05));
   INFO(ear.all());
   CHECK_FALSE(ear.heard("wheels: its clock"));
 }

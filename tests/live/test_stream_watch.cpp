@@ -1,9 +1,11 @@
 #include "src/live/stream_watch.h"
+#include "tests/support/about.h"
 
 #include <doctest/doctest.h>
 
 using namespace ear;
 using namespace ear::live;
+using ear::test::about;
 
 namespace {
 
@@ -36,7 +38,7 @@ bool contains(const std::vector<std::string>& said, const std::string& words) {
 TEST_CASE("stream watch: nothing is said of a stream that is as it should be") {
   StreamWatch watch("imu", 200.0, 0);
   CHECK(feed(watch, 1, 5000, 200.0).empty());
-  CHECK(watch.rate_hz() == doctest::Approx(200.0).epsilon(0.05));
+  CHECK(watch.rate_hz() == about(200.0, 0.05));
 }
 
 TEST_CASE("stream watch: silence is said within a second, once, and so is its end") {

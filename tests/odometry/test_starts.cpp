@@ -11,6 +11,7 @@
 
 #include "filter/filter.h"
 #include "src/health_text.h"
+#include "tests/support/about.h"
 #include "tests/support/workload.h"
 #include "tools/experiments/replay_simulation.h"
 #include "tools/simulator/simulation.h"
@@ -192,7 +193,7 @@ TEST_CASE("start given: one camera that flies, without wheels, in the world of t
     vehicle.wheels = false;
     vehicle.start = true_start(simulation, 9.5);
     const Outcome outcome = run(simulation, vehicle);
-    CHECK(outcome.first == doctest::Approx(0.5).epsilon(0.1));
+    CHECK(outcome.first == about(0.5, 0.1));
     CHECK(outcome.lost == 0);
     CHECK(outcome.length > 5.0);
     CHECK(outcome.position_rmse < 0.02 * outcome.length);
@@ -226,11 +227,11 @@ TEST_CASE("start given: what is given is the first estimate, as well known as sa
   const auto sigma = [&](int entry) { return std::sqrt(P(entry, entry)); };
   for (int axis = 0; axis < 3; ++axis) {
     CAPTURE(axis);
-    CHECK(sigma(at::rotation + axis) == doctest::Approx(axis < 2 ? start.tilt_sigma : 0.05).epsilon(0.02));
-    CHECK(sigma(at::velocity + axis) == doctest::Approx(start.velocity_sigma).epsilon(0.02));
-    CHECK(sigma(at::position + axis) == doctest::Approx(0.4).epsilon(0.02));
-    CHECK(sigma(at::gyro_bias + axis) == doctest::Approx(0.003).epsilon(0.02).scale(0.0));
-    CHECK(sigma(at::accel_bias + axis) == doctest::Approx(FilterConfig{}.prior.accel_bias).epsilon(0.02));
+    CHECK(sigma(at::rotation + axis) == about(axis < 2 ? start.tilt_sigma : 0.05, 0.02));
+    CHECK(sigma(at::velocity + axis) == about(start.velocity_sigma, 0.02));
+    CHECK(sigma(at::position + axis) == about(0.4, 0.02));
+    CHECK(sigma(at::gyro_bias + axis) == about(0.003, 0.02));
+    CHECK(sigma(at::accel_bias + axis) == about(FilterConfig{}.prior.accel_bias, 0.02));
     for (int other = 0; other < 3; ++other) {  // the velocity was given in the world, whatever the attitude is
       CHECK(std::abs(P(at::velocity + axis, at::rotation + other)) <
             0.02 * sigma(at::velocity + axis) * sigma(at::rotation + other));

@@ -14,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "tests/support/about.h"
 #include "tools/simulator/calibration_error.h"
 #include "tools/simulator/constants.h"
 #include "tools/simulator/lens.h"
@@ -23,6 +24,8 @@
 
 namespace ear::simulator {
 namespace {
+
+using test::about;
 
 using Draws = std::map<std::string, std::vector<double>>;
 
@@ -261,18 +264,18 @@ TEST_CASE("calibration error: without one, errors are of fixed sizes; the data d
   const Simulation imperfect(short_run(std::nullopt));
   const ear::Calibration& given = imperfect.calibration();
   const ear::Calibration& truth = imperfect.true_calibration();
-  CHECK(std::abs(given.encoder->wheel_radius[0] / 0.075 - 1.0) == doctest::Approx(0.003).epsilon(0.06).scale(0.0));
-  CHECK(std::abs(given.encoder->wheel_radius[1] / 0.075 - 1.0) == doctest::Approx(0.003).epsilon(0.06).scale(0.0));
+  CHECK(std::abs(given.encoder->wheel_radius[0] / 0.075 - 1.0) == about(0.003, 0.06));
+  CHECK(std::abs(given.encoder->wheel_radius[1] / 0.075 - 1.0) == about(0.003, 0.06));
   CHECK(std::abs(given.encoder->track_width / 0.40 - 1.0) == doctest::Approx(0.003).scale(0.0));
   CHECK(angle(given.encoder->T_BO.linear(), truth.encoder->T_BO.linear()) == doctest::Approx(0.2));
   for (std::size_t i = 0; i < 3; ++i) {
     const double cosine = given.lasers->beams[i].d_B.dot(truth.lasers->beams[i].d_B);
-    CHECK(std::acos(cosine) / kDegree == doctest::Approx(0.2).epsilon(1e-3));
+    CHECK(std::acos(cosine) / kDegree == about(0.2, 1e-3));
   }
   CHECK(angle(given.cameras[0].T_BC.linear(), truth.cameras[0].T_BC.linear()) == doctest::Approx(0.2));
   const Eigen::Isometry3d given_pair = given.cameras[0].T_BC.inverse() * given.cameras[1].T_BC;
   const Eigen::Isometry3d true_pair = truth.cameras[0].T_BC.inverse() * truth.cameras[1].T_BC;
-  CHECK(angle(given_pair.linear(), true_pair.linear()) == doctest::Approx(0.02).epsilon(1e-3).scale(0.0));
+  CHECK(angle(given_pair.linear(), true_pair.linear()) == about(0.02, 1e-3));
   CHECK((given_pair.translation() - true_pair.translation()).norm() < 1e-12);
   CHECK(given.cameras[0].fu == truth.cameras[0].fu);
   CHECK(std::abs(given.camera_time_offset) == doctest::Approx(0.001).scale(0.0));

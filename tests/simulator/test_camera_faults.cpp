@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "tests/support/about.h"
 #include "tools/simulator/constants.h"
 #include "tools/simulator/faults.h"
 #include "tools/simulator/lens.h"
@@ -16,6 +17,8 @@
 
 namespace ear::simulator {
 namespace {
+
+using test::about;
 
 constexpr double kBegin = 4.0;  // [s] of every fault here that says nothing else
 constexpr double kEnd = 6.0;
@@ -167,9 +170,8 @@ TEST_CASE("camera faults: in bad light few tracks are left, and they are noisier
         continued += find(faulty.tracks(i + 1), seen.id) != nullptr ? 1.0 : 0.0;
       }
     }
-    CHECK(kept / all == doctest::Approx(bad.share).epsilon(0.3));
-    CHECK(std::sqrt(squares / coordinates) ==
-          doctest::Approx(0.5 * std::sqrt(bad.noise * bad.noise - 1.0)).epsilon(0.05));
+    CHECK(kept / all == about(bad.share, 0.3));
+    CHECK(std::sqrt(squares / coordinates) == about(0.5 * std::sqrt(bad.noise * bad.noise - 1.0), 0.05));
     CHECK(continued == could);
   }
 }
@@ -422,7 +424,7 @@ TEST_CASE("hard landing: a stronger strike, clipped by the IMU; all else of the 
       read = std::max(read, sample.accel_B.cwiseAbs().maxCoeff() / kGravity);
     }
   }
-  CHECK(strongest == doctest::Approx(8.0).epsilon(0.1));
+  CHECK(strongest == about(8.0, 0.1));
   CHECK(read == doctest::Approx(4.0));
 
   const auto striking = [&](double t) { return t > touchdown - 0.02 && t < touchdown + 0.2; };

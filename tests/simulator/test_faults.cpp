@@ -8,12 +8,15 @@
 #include <string>
 #include <vector>
 
+#include "tests/support/about.h"
 #include "tools/simulator/constants.h"
 #include "tools/simulator/faults.h"
 #include "tools/simulator/simulation.h"
 
 namespace ear::simulator {
 namespace {
+
+using test::about;
 
 Options short_run(const std::string& sequence, double duration) {
   Options options;
@@ -212,16 +215,16 @@ TEST_CASE("faults: wheels that slip, spin or hang turn as much more as they shou
     check_others_alike(clean, faulty, "encoder");
     const double left = check_excess(faulty, false);
     const double right = check_excess(faulty, true);
-    CHECK(0.5 * (left + right) == doctest::Approx(-0.4 * travelled).epsilon(0.06));  // less at both ends
-    CHECK(slipped(faulty) == doctest::Approx(0.5 * (left + right)).epsilon(0.01));
+    CHECK(0.5 * (left + right) == about(-0.4 * travelled, 0.06));  // less at both ends
+    CHECK(slipped(faulty) == about(0.5 * (left + right), 0.01));
     CHECK(faulty.truth(kStart + 4'900'000'000).slip == 0.0);
     CHECK(faulty.truth(kStart + 8'100'000'000).slip == 0.0);
   }
   SUBCASE("idle spin of one wheel: speed times time, also where nothing moves") {
     const Simulation faulty = with_faults(options, {"wheel_idle_spin.right@5+3=0.5"});
     CHECK(check_excess(faulty, false) == 0.0);
-    CHECK(check_excess(faulty, true) == doctest::Approx(0.5 * 2.9).epsilon(0.01));
-    CHECK(slipped(faulty) == doctest::Approx(0.5 * 0.5 * 2.9).epsilon(0.01));
+    CHECK(check_excess(faulty, true) == about(0.5 * 2.9, 0.01));
+    CHECK(slipped(faulty) == about(0.5 * 0.5 * 2.9, 0.01));
     const Simulation standing = with_faults(short_run("static", 4.0), {"wheel_idle_spin@1+2"});
     CHECK(standing.encoders()[150].left_count != standing.encoders()[140].left_count);
     CHECK(standing.truth(kStart + 2'000'000'000).slip == doctest::Approx(0.3));
@@ -236,7 +239,7 @@ TEST_CASE("faults: wheels that slip, spin or hang turn as much more as they shou
       const auto& encoders = faulty.encoders();
       return metres(static_cast<double>(turned(encoders[i].left_count, encoders[i + 20].left_count))) / 0.2;
     };
-    CHECK(speed(7.5) == doctest::Approx(speed(5.3) * std::exp(-2.2 / 2.0)).epsilon(0.02));
+    CHECK(speed(7.5) == about(speed(5.3) * std::exp(-2.2 / 2.0), 0.02));
     CHECK(slipped(faulty) == 0.0);  // it does not touch the ground
   }
 }

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "tests/support/about.h"
 #include "tools/simulator/faults.h"
 #include "tools/simulator/lens.h"
 #include "tools/simulator/picture_maker.h"
@@ -16,6 +17,8 @@
 
 namespace ear::simulator {
 namespace {
+
+using test::about;
 
 Simulation faulty(const std::vector<std::string>& faults) {
   Options options;
@@ -85,7 +88,7 @@ TEST_CASE("pictures: too little light, too much, none; frozen, swapped; in both 
   CHECK(unchanged(right(8)));
 
   for (const Shot& shot : {left(8 + second / 2), right(8 + second / 2)}) {
-    CHECK(mean_of(pictures.make(shot)) == doctest::Approx(0.05 * mean_of(clean.make(shot))).epsilon(0.1));
+    CHECK(mean_of(pictures.make(shot)) == about(0.05 * mean_of(clean.make(shot)), 0.1));
     CHECK(changed_by_faults(simulation, shot));
   }
   const std::size_t bright = 8 + second + second / 2;
@@ -94,7 +97,7 @@ TEST_CASE("pictures: too little light, too much, none; frozen, swapped; in both 
   CHECK(unchanged(right(bright)));
   const std::size_t covered = bright + second;
   CHECK(unchanged(left(covered)));
-  CHECK(mean_of(pictures.make(right(covered))) == doctest::Approx(6.0).epsilon(0.05));
+  CHECK(mean_of(pictures.make(right(covered))) == about(6.0, 0.05));
   CHECK(changed_by_faults(simulation, right(covered)));
 
   // Those of another time and of the other camera, to the byte.

@@ -10,12 +10,15 @@
 #include <vector>
 
 #include "tests/simulator/support.h"
+#include "tests/support/about.h"
 #include "tools/simulator/constants.h"
 #include "tools/simulator/scene.h"
 #include "tools/simulator/simulation.h"
 
 namespace ear::simulator {
 namespace {
+
+using test::about;
 
 // How deep a disc's rim lies below the ground, by trying every point: independent of the simulator's contact solver.
 double deepest_by_search(const Terrain& terrain, const Eigen::Vector3d& centre_W, const Eigen::Vector3d& axle_W,
@@ -188,7 +191,7 @@ TEST_CASE("motion: wheels stay on the ground and roll straight ahead, clear of e
   for (const Expected& expected : table) {
     CAPTURE(expected.name);
     const Simulation simulation(ideal(expected.name, 4));
-    CHECK(simulation.path_length() == doctest::Approx(expected.length).epsilon(0.03));
+    CHECK(simulation.path_length() == about(expected.length, 0.03));
     const Integrated end = integrate(simulation);
     const Truth truth = simulation.truth(simulation.imu()[simulation.imu().size() - 2].t_ns + 2'500'000);
     CHECK((end.p_W - truth.p_WB).norm() < 0.01);

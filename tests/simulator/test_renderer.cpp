@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "tests/simulator/support.h"
+#include "tests/support/about.h"
 #include "tools/simulator/constants.h"
 #include "tools/simulator/image_sensor.h"
 #include "tools/simulator/lens.h"
@@ -21,6 +22,8 @@
 
 namespace ear::simulator {
 namespace {
+
+using test::about;
 
 constexpr double kSquare = 0.12;  // [m] of the checkerboard
 constexpr int kSquares = 24;      // per edge
@@ -247,8 +250,8 @@ TEST_CASE("renderer: in the room, both cameras and the next moment see the same 
       CHECK(difference(1.0, 0.0) > 1.3 * here);
       CHECK(difference(0.0, 1.0) > 1.3 * here);
       // The two sides are alike: no shift of a tenth of a pixel hides in here.
-      CHECK(difference(1.0, 0.0) == doctest::Approx(difference(-1.0, 0.0)).epsilon(0.1));
-      CHECK(difference(0.0, 1.0) == doctest::Approx(difference(0.0, -1.0)).epsilon(0.1));
+      CHECK(difference(1.0, 0.0) == about(difference(-1.0, 0.0), 0.1));
+      CHECK(difference(0.0, 1.0) == about(difference(0.0, -1.0), 0.1));
     }
   }
 }
@@ -261,9 +264,9 @@ TEST_CASE("image sensor: noise is unbiased and as strong as it claims, and follo
     const cv::Mat picture = sensor.read(flat, picture_key(1, 123456789, 0));
     cv::Scalar mean, sigma;
     cv::meanStdDev(picture, mean, sigma);
-    CHECK(mean[0] == doctest::Approx(grey).epsilon(4.0 * 3.0 / std::sqrt(307200.0) / grey));
+    CHECK(mean[0] == about(grey, 4.0 * 3.0 / std::sqrt(307200.0) / grey));
     // Rounding to whole grey levels adds a twelfth.
-    CHECK(sigma[0] == doctest::Approx(std::sqrt(noise_sigma(grey) * noise_sigma(grey) + 1.0 / 12.0)).epsilon(0.01));
+    CHECK(sigma[0] == about(std::sqrt(noise_sigma(grey) * noise_sigma(grey) + 1.0 / 12.0), 0.01));
     CHECK(cv::norm(picture, sensor.read(flat, picture_key(1, 123456789, 0)), cv::NORM_INF) == 0.0);
     // Another camera, another time, another seed: noise that has nothing to do with it.
     for (const std::uint64_t key :

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "tests/simulator/support.h"
+#include "tests/support/about.h"
 #include "tools/simulator/constants.h"
 #include "tools/simulator/sensors.h"
 #include "tools/simulator/simulation.h"
@@ -17,6 +18,8 @@
 
 namespace ear::simulator {
 namespace {
+
+using test::about;
 
 ear::Calibration vehicle() { return make_vehicle(30.0, ear::LensModel::radial_tangential); }
 
@@ -159,7 +162,7 @@ TEST_CASE("encoders: wheels that spin idly turn, and the truth says how fast, bu
   }
   CHECK(forward > 0.6);    // 4 s at 0.275 m/s, 30 % more or less
   CHECK(backward < -0.4);  // 3 s at -0.25 m/s
-  CHECK(forward + backward == doctest::Approx(given).epsilon(0.002));
+  CHECK(forward + backward == about(given, 0.002));
   CHECK(simulation.truth(simulation.imu().back().t_ns).slip == 0.0);
 }
 
@@ -273,13 +276,13 @@ TEST_CASE("lasers: as many readings are lost and wrong as the faults say; withou
     return readings;
   };
   CHECK(count(with({}), [](double range) { return range != 0.5; }) == 0.0);
-  CHECK(count(with({0.03, 0.0, 0.0}), lost) == doctest::Approx(0.03).epsilon(0.1).scale(0.0));
+  CHECK(count(with({0.03, 0.0, 0.0}), lost) == about(0.03, 0.1));
   const std::vector<LaserSample> wrong = with({0.0, 0.04, 0.0});
   CHECK(count(wrong, lost) == 0.0);
-  CHECK(count(wrong, nearer) == doctest::Approx(0.03).epsilon(0.1).scale(0.0));
-  CHECK(count(wrong, farther) == doctest::Approx(0.01).epsilon(0.2).scale(0.0));
+  CHECK(count(wrong, nearer) == about(0.03, 0.1));
+  CHECK(count(wrong, farther) == about(0.01, 0.2));
   // 0.05 fades per second of 0.6 s in the mean: 3 % of the time, in runs.
-  CHECK(count(with({0.0, 0.0, 0.05}), lost) == doctest::Approx(0.03).epsilon(0.4).scale(0.0));
+  CHECK(count(with({0.0, 0.0, 0.05}), lost) == about(0.03, 0.4));
 }
 
 TEST_CASE("lasers: a sequence with faults has them, the flat floor none") {
@@ -370,8 +373,8 @@ TEST_CASE("simulation: initial biases are of the promised size") {
     gyro.push_back(bias.gyro.norm());
     accel.push_back(bias.accel.norm());
   }
-  CHECK(moments(gyro).mean == doctest::Approx(5e-3).epsilon(0.1).scale(0.0));
-  CHECK(moments(accel).mean == doctest::Approx(0.05).epsilon(0.1).scale(0.0));
+  CHECK(moments(gyro).mean == about(5e-3, 0.1));
+  CHECK(moments(accel).mean == about(0.05, 0.1));
 }
 
 TEST_CASE("simulation: the same seed gives the same data, another seed other data") {

@@ -8,6 +8,7 @@
 #include <set>
 #include <vector>
 
+#include "tests/support/about.h"
 #include "tools/simulator/constants.h"
 #include "tools/simulator/lens.h"
 #include "tools/simulator/simulation.h"
@@ -15,6 +16,8 @@
 
 namespace ear::simulator {
 namespace {
+
+using test::about;
 
 Eigen::Isometry3d pose_WC(const Truth& truth, const ear::CameraCalibration& camera) {
   Eigen::Isometry3d T_WB = Eigen::Isometry3d::Identity();
@@ -132,7 +135,7 @@ TEST_CASE("tracks: rays of one id meet in one point, and the noise is what was a
       n += 2.0;
     }
   }
-  CHECK(std::sqrt(sum / n) == doctest::Approx(0.5).epsilon(4.0 / std::sqrt(2.0 * n)));
+  CHECK(std::sqrt(sum / n) == about(0.5, 4.0 / std::sqrt(2.0 * n)));
 }
 
 TEST_CASE("tracks: as many as asked, spread over the picture, ids never come back") {
@@ -189,7 +192,7 @@ TEST_CASE("tracks: a standing camera loses tracks at the rate of their mean life
   }
   const double lost = 1.0 - kept / before;
   const double expected = 1.0 - std::exp(-1.0 / 30.0 / 3.0);
-  CHECK(lost == doctest::Approx(expected).epsilon(4.0 / std::sqrt(before * expected)));
+  CHECK(lost == about(expected, 4.0 / std::sqrt(before * expected)));
 }
 
 TEST_CASE("tracks: no feature lies behind furniture") {

@@ -1,4 +1,5 @@
-"""How large classes may grow, and how many constants the filter may have. check(root) returns one line of text per fault.
+"""How large classes may grow, how many constants the filter may have, and bounds of tests that hold whatever comes out.
+check(root) returns one line of text per fault.
 
 Run as a program, it checks the project: structure.py ROOT.
 """
@@ -18,6 +19,10 @@ MOST_CONSTANTS = 120
 # A constant is a statement that gives `constexpr` names beginning with k a value; `// ...` beside or above it has the source.
 CONSTANT = re.compile(r"^[^/\n]*\bconstexpr\s+([\w:]+|std::array<[^=]*>)\s+(k[A-Z]\w*)\s*(?:\[\w*\])?\s*=", re.MULTILINE)
 SOURCE = re.compile(r"\b(chosen|measured|data sheets?|by definition|standard deviation over)\b", re.IGNORECASE)
+
+# doctest's Approx(value).epsilon(share) allows a share of 1 + |value|. As a bound of per cent it is given by about().
+LOOSE_BOUND = re.compile(r"\bApprox\b(?!.*\.scale\().*\.epsilon\((?!1e-([4-9]|1\d)\b)")
+ABOUT = "tests/support/about.h"
 
 CLASS = re.compile(r"^(?:template <[^>]*>\s*)?(?:class|struct) (?:\w+::)*(\w+)(?: final)?(?:\s*:[^{;]*)?\s*\{", re.MULTILINE)
 
@@ -108,8 +113,18 @@ def check_constants(root):
     return faults
 
 
+def check_bounds(root):
+    faults = []
+    for file in sorted((root / "tests").rglob("*")):
+        if file.suffix in (".h", ".cpp") and file != root / ABOUT:
+            for line, text in enumerate(file.read_text(encoding="utf-8").split("\n"), 1):
+                if LOOSE_BOUND.search(text):
+                    faults.append(f"{file.relative_to(root)}:{line}: the bound holds for anything small; use about() of {ABOUT}")
+    return faults
+
+
 def check(root):
-    faults = check_constants(root)
+    faults = check_constants(root) + check_bounds(root)
     for folder in FOLDERS:
         for file in sorted((root / folder).rglob("*")):
             if file.suffix not in (".h", ".cpp"):

@@ -45,6 +45,12 @@ inline constexpr int theta = 0;
 """
         self.assertEqual(structure.constants_of(text), (["kTick", "kShare", "kBare", "kA", "kBoth"], ["kBare"]))
 
+    def test_loose_bounds(self):
+        self.assertTrue(structure.LOOSE_BOUND.search("CHECK(x == doctest::Approx(f(0.3)).epsilon(0.1));"))
+        self.assertFalse(structure.LOOSE_BOUND.search("CHECK(x == doctest::Approx(f(0.3)).epsilon(1e-9));"))
+        self.assertFalse(structure.LOOSE_BOUND.search("CHECK(x == doctest::Approx(300.0).epsilon(0.01).scale(300.0));"))
+        self.assertFalse(structure.LOOSE_BOUND.search("CHECK(x == about(0.3, 0.1));"))
+
 
 if __name__ == "__main__":
     unittest.main()
