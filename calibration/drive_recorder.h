@@ -29,7 +29,6 @@ class DriveRecorder final : public Estimator {
   void set_window(int clones) override { filter_.set_window(clones); }
   [[nodiscard]] InputCounts input_counts() const override { return filter_.input_counts(); }
   [[nodiscard]] FrameStamp check_stamp(TimeNs t_ns) const override { return filter_.check_stamp(t_ns); }
-  [[nodiscard]] TimeNs camera_time(TimeNs imu_time_ns) const override { return filter_.camera_time(imu_time_ns); }
   [[nodiscard]] CalibrationState calibration() const override { return filter_.calibration(); }
 
  private:

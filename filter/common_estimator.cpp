@@ -5,9 +5,9 @@
 #include <stdexcept>
 #include <utility>
 
+#include "filter/ekf/initial_state.h"
 #include "filter/ekf/propagation.h"
-#include "filter/ingest/silence.h"
-#include "filter/ingest/stamp_guard.h"
+#include "filter/ingest/limits.h"
 #include "filter/sources/ground/ground_rows.h"
 
 namespace ear {
@@ -24,7 +24,7 @@ RelativeMotion motion_between(const Pose& T_WB0, const NavState& next) {
 
 }  // namespace
 
-CommonEstimator::CommonEstimator(const FilterConfig& config, const Calibration& calibration, bool uses_beams)
+CommonEstimator::CommonEstimator(const FilterConfig& config, const Calibration& calibration)
     : config_(config),
       calibration_(calibration),
       ingest_(config, calibration),
@@ -32,7 +32,7 @@ CommonEstimator::CommonEstimator(const FilterConfig& config, const Calibration& 
       sources_(config, calibration),
       start_(config, calibration),
       consistency_check_(config.anomaly),
-      health_(calibration, sources_.uses_wheels(), uses_beams) {
+      health_(calibration, sources_.uses_wheels(), config.odometer.model == OdometerModel::terrain) {
   if (calibration.lasers) laser_.range.reserve(calibration.lasers->beams.size());
 }
 
@@ -44,7 +44,7 @@ void CommonEstimator::succeed(CommonEstimator& before, TimeNs t_ns, TimeNs clock
   alignment_ = before.alignment_;
   last_good_ = std::move(before.last_good_);
   if (last_good_) last_good_->state.t_ns += clock_shift;
-  report_tracks(before.outcomes());
+  report_tracks(before.records_.outcomes);
 }
 
 void CommonEstimator::forget_state() {
@@ -66,46 +66,50 @@ void CommonEstimator::add_imu(const ImuSample& sample) {
   take_imu();
 }
 
+void CommonEstimator::hear(ImuClock::Stream stream, TimeNs stamp_ns) {
+  ingest_.imu_clock().observe(stream, stamp_ns);
+  take_imu();
+}
+
 /// The samples that do not wait any more for a verdict on their clock.
 void CommonEstimator::take_imu() {
   while (const std::optional<ImuSample> sample = ingest_.imu_clock().next()) {
-    const ImuVerdict verdict = ingest_.judge(*sample);
+    const ImuVerdict verdict = ingest_.judge(*sample, ekf_.running());
     if (!verdict.accepted) {
       health_.add_refused_imu();
       continue;
     }
     if (verdict.begins_anew) restart(sample->t_ns, verdict.clock_shift);
-    health_.add_imu(*sample, config_.max_imu_gap);
+    health_.add_imu(sample->t_ns, config_.max_imu_gap);
     const std::optional<TimeNs> due_ns = ingest_.imu_due();
     if (due_ns && ekf_.running()) make_room(*due_ns);
     health_.report_imu_fault(ingest_.store(*sample), sample->t_ns);
     note(sources_.watch_contact(ingest_.imu().newest(), ekf_));
   }
-  if (ingest_.imu_clock().take_correction()) health_.report_imu_fault({true, true}, ingest_.imu().newest().t_ns);
+  const bool corrected = ingest_.imu_clock().take_correction();
+  if (corrected && !ingest_.imu().empty()) health_.report_imu_fault({true, true}, ingest_.imu().newest().t_ns);
 }
 
 void CommonEstimator::add_encoder(const EncoderSample& given) {
   if (!sources_.uses_wheels()) return;
   EncoderSample sample = given;
   sample.t_ns = later_by(calibration_.encoder->time_offset, given.t_ns);
-  ingest_.imu_clock().observe(ImuClock::Stream::encoder, sample.t_ns);
-  take_imu();
+  hear(ImuClock::Stream::encoder, sample.t_ns);
   const Ingest::Encoders taken = ingest_.take(sample, ekf_.time());
   if (!ingest_.imu().empty()) health_.add_encoder(taken.verdict, ingest_.imu().newest().t_ns);
   if (taken.verdict != Verdict::accepted || !taken.increment) return;
   note(sources_.watch_contact(*taken.increment, ekf_));
   sources_.standstill().add(*taken.increment);
-  if (const auto due_ns = ingest_.due_before(*taken.increment, ekf_.running())) make_room(*due_ns);
-  ingest_.push(*taken.increment);
+  if (const auto due_ns = ingest_.push(*taken.increment, ekf_.running())) make_room(*due_ns);
 }
 
 void CommonEstimator::add_laser(const LaserSample& given) {
-  if (!sources_.uses_wheels() || !calibration_.lasers || calibration_.lasers->beams.empty()) return;
+  if (!sources_.uses_wheels() || !has_beams(calibration_)) return;
+  const TimeNs t_ns = later_by(calibration_.lasers->time_offset, given.t_ns);
+  hear(ImuClock::Stream::laser, t_ns);  // all may begin anew, this sample too
   LaserSample& sample = laser_;
-  sample.t_ns = later_by(calibration_.lasers->time_offset, given.t_ns);
+  sample.t_ns = t_ns;
   sample.range.assign(given.range.begin(), given.range.end());
-  ingest_.imu_clock().observe(ImuClock::Stream::laser, sample.t_ns);
-  take_imu();
   const Verdict verdict = ingest_.judge(sample, ekf_.time());
   if (verdict == Verdict::accepted) note(sources_.watch_contact(sample, ekf_));
   if (!ingest_.imu().empty()) {
@@ -113,14 +117,11 @@ void CommonEstimator::add_laser(const LaserSample& given) {
     health_.add_laser(sample, verdict, *calibration_.lasers, sources_.ground().stuck_beams(), newest_ns);
   }
   if (verdict != Verdict::accepted) return;
-  const BeamRanges ranges(sample);
-  if (const auto due_ns = ingest_.due_before(ranges, ekf_.running())) make_room(*due_ns);
-  ingest_.push(ranges);
+  if (const auto due_ns = ingest_.push(BeamRanges(sample), ekf_.running())) make_room(*due_ns);
 }
 
 std::optional<TimeNs> CommonEstimator::common_stamp(TimeNs camera_stamp_ns) {
-  ingest_.imu_clock().observe(ImuClock::Stream::camera, camera_stamp_ns);
-  take_imu();
+  hear(ImuClock::Stream::camera, camera_stamp_ns);
   if (!is_time(camera_stamp_ns)) return camera_stamp_ns;
   const std::optional<TimeNs> stamp = ingest_.camera_stamp(camera_stamp_ns);
   if (!stamp) health_.report_camera_fault(ingest_.imu().newest().t_ns);
@@ -136,7 +137,6 @@ void CommonEstimator::refuse_frame() {
 TimeNs CommonEstimator::begin_frame(const FeatureFrame& frame) {
   last_frame_ns_ = frame.t_ns;
   consistency_ = Consistency{};
-  records_.outcomes = outcomes();
   if (records_.outcomes != nullptr) records_.outcomes->clear();
   records_.log.start_frame();
   records_.statistics = FrameStatistics{};
@@ -147,10 +147,6 @@ TimeNs CommonEstimator::begin_frame(const FeatureFrame& frame) {
   const TimeNs t_ns = imu_time(frame.t_ns, ekf_.state().camera);
   sources_.look_at(frame, t_ns, ingest_, ekf_);
   return t_ns;
-}
-
-bool CommonEstimator::check_image(const FeatureFrame& frame, const FrameAgreement& seen) {
-  return health_.check_image(seen, imu_time(frame.t_ns, ekf_.state().camera), ingest_.imu().newest().t_ns);
 }
 
 std::optional<Estimate> CommonEstimator::make_estimate(bool ground_known, const UnseenScales& scales) const {
@@ -203,10 +199,6 @@ std::optional<Estimate> CommonEstimator::give(std::optional<Estimate> estimate) 
 }
 
 // ---- Questions
-
-TimeNs CommonEstimator::camera_time(TimeNs imu_time_ns) const {
-  return ear::camera_time(imu_time_ns, ekf_.state().camera);
-}
 
 std::optional<RelativeMotion> CommonEstimator::motion_to(TimeNs t_ns) const {
   const std::optional<LastImage>& last = sources_.cameras().last_image();

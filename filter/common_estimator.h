@@ -3,6 +3,7 @@
 #pragma once
 
 #include <optional>
+#include <vector>
 
 #include "ear/calibration.h"
 #include "ear/estimate.h"
@@ -33,12 +34,12 @@ class CommonEstimator : public Estimator {
   [[nodiscard]] const Health& health() const final { return health_.health(); }
   void refuse_frame() final;
   [[nodiscard]] InputCounts input_counts() const final { return ingest_.counts(); }
-  [[nodiscard]] TimeNs camera_time(TimeNs imu_time_ns) const final;
   [[nodiscard]] CalibrationState calibration() const final { return {ekf_.state().camera, ekf_.state().odometer}; }
+  void report_tracks(std::vector<TrackOutcome>* outcomes) final { records_.outcomes = outcomes; }
 
  protected:
-  /// Usable settings and calibration. `uses_beams`: health looks at the lasers.
-  CommonEstimator(const FilterConfig& config, const Calibration& calibration, bool uses_beams);
+  /// Usable settings and calibration.
+  CommonEstimator(const FilterConfig& config, const Calibration& calibration);
 
   /// As after construction, but for the clocks, and where the vehicle was last known to be. The stamps before are to be
   /// moved by `clock_shift` [ns]; the first of the samples that follow is at `t_ns`.
@@ -50,8 +51,6 @@ class CommonEstimator : public Estimator {
   TimeNs begin_frame(const FeatureFrame& frame);
   /// How the sensors are to be used over the interval that ends with the frame.
   [[nodiscard]] Advice advice() const { return advise(consistency_, health_.health(), config_.anomaly); }
-  /// May this image be used?
-  [[nodiscard]] bool check_image(const FeatureFrame& frame, const FrameAgreement& seen);
 
   /// After the frame: the estimate, if there is a state. `ground_known`: the lasers have seen its normal.
   /// `scales`: those that nothing measures.
@@ -79,11 +78,13 @@ class CommonEstimator : public Estimator {
  private:
   /// All begins anew: succeed().
   virtual void restart(TimeNs t_ns, TimeNs clock_shift) = 0;
-  /// The state moves on, before samples or readings up to `t_ns` make room.
+  /// The state moves on to `t_ns`: samples or readings up to there make room.
   virtual void make_room(TimeNs t_ns) = 0;
   /// The wheels left the ground, or met it, or nothing happened.
   virtual void note(ContactEvent /*event*/) {}
 
+  /// Another sensor's reading comes in.
+  void hear(ImuClock::Stream stream, TimeNs stamp_ns);
   void take_imu();
 
   LaserSample laser_;  ///< the one that comes in, by the clock of the IMU; its memory is used again

@@ -79,19 +79,15 @@ class Estimator {
   virtual void set_window(int clones) = 0;
   [[nodiscard]] virtual InputCounts input_counts() const = 0;  ///< of samples
   [[nodiscard]] virtual FrameStamp check_stamp(TimeNs t_ns) const = 0;
-  [[nodiscard]] virtual TimeNs camera_time(
-      TimeNs imu_time_ns) const = 0;  ///< the stamp that the camera has at that time
   [[nodiscard]] virtual CalibrationState calibration() const = 0;
+  /// The stamp that the camera has at that time.
+  [[nodiscard]] TimeNs camera_time(TimeNs imu_time_ns) const {
+    return ear::camera_time(imu_time_ns, calibration().camera);
+  }
 
   /// From now on each frame leaves in `outcomes`, which must outlive this, what became of the tracks that it tested;
   /// an estimator that does not know leaves nothing. Null: no longer.
-  void report_tracks(std::vector<TrackOutcome>* outcomes) { outcomes_ = outcomes; }
-
- protected:
-  [[nodiscard]] std::vector<TrackOutcome>* outcomes() const { return outcomes_; }
-
- private:
-  std::vector<TrackOutcome>* outcomes_ = nullptr;
+  virtual void report_tracks(std::vector<TrackOutcome>* /*outcomes*/) {}
 };
 
 }  // namespace ear

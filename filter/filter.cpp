@@ -3,13 +3,12 @@
 #include <utility>
 
 #include "filter/ekf/initial_state.h"
-#include "filter/ingest/silence.h"
+#include "filter/ingest/limits.h"
 
 namespace ear {
 
 Filter::Filter(const FilterConfig& config, const Calibration& calibration)
-    : CommonEstimator(settings_for(checked(config), checked(calibration)), calibration,
-                      config.odometer.model == OdometerModel::terrain) {}
+    : CommonEstimator(settings_for(checked(config), checked(calibration)), calibration) {}
 
 // ---- What happens to a frame
 
@@ -22,13 +21,9 @@ std::optional<Estimate> Filter::process(const FeatureFrame& given) {
   propagate_to(frame);  // start, or compare the sensors (13)-(15) and take in wheels (5)-(8) and lasers (2)-(4)
 
   const FrameAgreement seen = sources_.check(frame, ingest_, ekf_);
-  const bool use_image = check_image(frame, seen);
+  const bool use_image = health_.check_image(seen, imu_time(frame.t_ns, ekf_.state().camera));
   if (ekf_.running()) {
-    if (use_image) {
-      sources_.use_image(frame, sources_.standstill().stands(), advice(), ekf_, records_);
-    } else {
-      sources_.go_without_image(advice(), ekf_, records_);
-    }
+    sources_.update(use_image ? &frame : nullptr, sources_.standstill().stands(), advice(), ekf_, records_);
     watch_biases();
   }
   if (use_image) sources_.cameras().remember(frame, ekf_);
@@ -40,7 +35,7 @@ std::optional<Estimate> Filter::process_without_image(TimeNs t_ns) {
   if (sources_.cameras().count() > 0 && !sources_.on_ground()) return std::nullopt;
   propagate_to(FeatureFrame{t_ns, {}});
   if (ekf_.running()) {
-    sources_.go_without_image(advice(), ekf_, records_);
+    sources_.update(nullptr, sources_.standstill().stands(), advice(), ekf_, records_);
     watch_biases();
   }
   return report(false, FrameAgreement{});
@@ -90,14 +85,15 @@ std::optional<Estimate> Filter::report(bool image, const FrameAgreement& seen) {
 /// with the inertial samples, it is the state that is wrong, and begins anew.
 void Filter::start(const FeatureFrame& frame) {
   const bool lost = ekf_.running();
-  const CameraState given = camera_state(calibration_);  // what was learned may be as wrong as the rest
-  const TimeNs t_ns = imu_time(frame.t_ns, given);
-  const ImuStatistics recent = lost ? ImuStatistics{} : sources_.standstill().recent(ingest_.imu(), t_ns);
-  const bool restarts = lost || without_state_ == Status::lost;
-  if (!restarts) without_state_ = recent.count < 2 ? Status::waiting_for_imu : Status::waiting_for_standstill;
-  const Start::Situation now{frame, t_ns, sources_.standstill().stands(), sources_.on_ground(), restarts, given};
-  const std::optional<StartState> found =
-      lost ? start_.find_in_motion(now, ingest_, health_.contradicted()) : start_.find(now, recent, ingest_);
+  const TimeNs t_ns = imu_time(frame.t_ns, camera_state(calibration_));  // what was learned may be as wrong as the rest
+  Start::Situation now{frame, t_ns, sources_.standstill().recent(ingest_.imu(), t_ns)};
+  now.stands = sources_.standstill().stands();
+  now.rolls = sources_.on_ground();
+  now.restarts = lost || without_state_ == Status::lost;
+  now.lost = lost;
+  now.contradicted = health_.contradicted();
+  if (!now.restarts) without_state_ = now.recent.count < 2 ? Status::waiting_for_imu : Status::waiting_for_standstill;
+  const std::optional<StartState> found = start_.find(now, ingest_);
   if (!found) return;
   if (lost) stop();
   const Advice advice = this->advice();
@@ -114,6 +110,7 @@ void Filter::stop() {
 void Filter::restart(TimeNs t_ns, TimeNs clock_shift) {
   Filter fresh(config_, calibration_);
   fresh.succeed(*this, t_ns, clock_shift);
+  fresh.set_window(sources_.cameras().window());
   if (ekf_.running() || without_state_ == Status::lost) fresh.without_state_ = Status::lost;
   *this = std::move(fresh);
 }

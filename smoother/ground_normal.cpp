@@ -36,11 +36,8 @@ bool GroundNormal::add(const BeamRanges& ranges, const OdometerState& odometer, 
   Eigen::Matrix2d A = Eigen::Matrix2d::Zero();  // of the reading alone
   Eigen::Vector2d b = Eigen::Vector2d::Zero();
   const auto take = [&](double residual, const Eigen::RowVector2d& h, double sigma) {
-    Innovation innovation;
-    innovation.value = residual;
-    innovation.variance = (h * P_ * h.transpose()).value() + sigma * sigma;
-    innovation.gate = gate_.quantile(1);
-    innovation.fits = gate_.fits(residual, innovation.variance);
+    const double variance = (h * P_ * h.transpose()).value() + sigma * sigma;
+    const Innovation innovation = Innovation::of(residual, variance, gate_.quantile(1));
     if (innovation.fits) {
       A += h.transpose() * h / (sigma * sigma);
       b += h.transpose() * residual / (sigma * sigma);

@@ -140,7 +140,7 @@ bool IntervalMeter::add_noise(WheelDisplacement& z, const Situation& now, Record
     const double d = u.dot(wheels.p_BiBj - inertial.p_BiBj);
     const double inertial_variance = u.dot(inertial.covariance * u);
     const double noise = u.dot(wheels.covariance * u);
-    const bool fits = gate_.fits(d, inertial_variance + noise);
+    const bool fits = gate_.fits(d * d, inertial_variance + noise, 1);
     if (i == 0) {  // both wheels together, as a speed
       const double per_time = 1.0 / (z.duration * z.duration);
       const Innovation speed{d / z.duration, (inertial_variance + noise) * per_time, gate_.quantile(1), fits};

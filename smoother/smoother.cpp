@@ -20,7 +20,7 @@ FilterConfig supported(FilterConfig config, const Calibration& calibration) {
   if (calibration.encoder && model != OdometerModel::none && model != OdometerModel::terrain) {
     throw std::invalid_argument("smoother: filter.odometer.model: terrain or none");
   }
-  if (!calibration.lasers || calibration.lasers->beams.empty()) model = OdometerModel::none;
+  if (!has_beams(calibration)) model = OdometerModel::none;
   return config;
 }
 
@@ -46,7 +46,7 @@ void assume_newest(const Window& window, const GroundNormal& normal, Eigen::Matr
 }  // namespace
 
 Smoother::Smoother(const FilterConfig& config, const Calibration& calibration)
-    : CommonEstimator(supported(settings_for(checked(config), checked(calibration)), calibration), calibration, true),
+    : CommonEstimator(supported(settings_for(checked(config), checked(calibration)), calibration), calibration),
       meter_(config_, calibration) {}
 
 // ---- What happens to a frame
@@ -70,7 +70,8 @@ FrameAgreement Smoother::move_to(const FeatureFrame& frame, bool image) {
   if (window_) return step(frame, t_ns, image);
   start(frame, t_ns);
   const FrameAgreement nothing;
-  if (image && check_image(frame, nothing)) sources_.cameras().remember(frame, ekf_);
+  if (image && health_.check_image(nothing, imu_time(frame.t_ns, ekf_.state().camera)))
+    sources_.cameras().remember(frame, ekf_);
   return nothing;
 }
 
@@ -90,7 +91,7 @@ FrameAgreement Smoother::step(const FeatureFrame& frame, TimeNs t_ns, bool image
 
   sources_.propagate(t_ns, advice, ingest_, ekf_);  // for the images to be compared with
   const FrameAgreement seen = image ? sources_.check(frame, ingest_, ekf_) : FrameAgreement{};
-  const bool use_image = image && check_image(frame, seen);
+  const bool use_image = image && health_.check_image(seen, t_ns);
   next.feature_noise = seen.noise / advice.of(MotionSensor::camera);
 
   window_->add(next, use_image ? frame.features : std::vector<FeatureObservation>{});
@@ -126,8 +127,13 @@ std::optional<Estimate> Smoother::report(bool image, const FrameAgreement& seen)
 /// As the filter does. From there on the window has its state and covariance.
 void Smoother::start(const FeatureFrame& frame, TimeNs t_ns) {
   const bool stands = sources_.standstill().stands();
-  const Start::Situation now{frame, t_ns, stands, sources_.on_ground(), last_good_.has_value(), ekf_.state().camera};
-  const std::optional<StartState> found = start_.find(now, sources_.standstill().recent(ingest_.imu(), t_ns), ingest_);
+  const Start::Situation now{frame,
+                             t_ns,
+                             sources_.standstill().recent(ingest_.imu(), t_ns),
+                             stands,
+                             sources_.on_ground(),
+                             last_good_.has_value()};
+  const std::optional<StartState> found = start_.find(now, ingest_);
   if (!found) return;
   alignment_ = start_.begin(*found, last_good_, Advice{}, ingest_, ekf_, sources_, records_);
   sources_.advance(t_ns, Advice{}, ingest_, ekf_, records_);

@@ -122,7 +122,7 @@ bool Terms::fits(const PointTerm& term) const {
     sum += rho[1] * r.squaredNorm();
   }
   const int freedom = 2 * static_cast<int>(term.factors.size()) - 3;
-  return gate_.fits_distance(sum, freedom) && (*term.block)[2] > 0.0;
+  return gate_.fits(sum, 1.0, freedom) && (*term.block)[2] > 0.0;
 }
 
 int Terms::drop_outliers(TrackTable& tracks) {

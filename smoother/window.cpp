@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "filter/sources/cameras/parallax.h"
 #include "smoother/minimum.h"
 #include "smoother/normal_equations.h"
 #include "smoother/wheel_chain.h"
@@ -134,11 +133,11 @@ std::size_t Window::frame_to_drop() {
   return copy && !(parallax_px(0, n - 1) < config_.keyframe_parallax_px) ? n - 2 : 0;
 }
 
-double Window::parallax_px(std::size_t from, std::size_t to) {
+double Window::parallax_px(std::size_t from, std::size_t to) const {
   const Eigen::Matrix3d R_BC0 = unknowns_.cameras().T_BC0.R;
   const FrameRotation a{unknowns_[from].number, unknowns_.pose(from).R * R_BC0};
   const FrameRotation b{unknowns_[to].number, unknowns_.pose(to).R * R_BC0};
-  return focal_px_ * median_parallax(tracks_, a, b, parallax_);
+  return focal_px_ * tracks_.median_parallax(a, b);
 }
 
 /// What the oldest frame and all features that it saw show of the others becomes part of the prior. These features'

@@ -49,7 +49,7 @@ class Window {
 
  private:
   [[nodiscard]] std::size_t frame_to_drop();
-  [[nodiscard]] double parallax_px(std::size_t from, std::size_t to);
+  [[nodiscard]] double parallax_px(std::size_t from, std::size_t to) const;
   void marginalize_oldest();
   void drop_frame(std::size_t index);
   void set_prior(std::unique_ptr<PriorFactor> prior);
@@ -61,7 +61,6 @@ class Window {
   Terms terms_;
   Factor prior_;
   int features_rejected_ = 0;
-  std::vector<double> parallax_;  // memory that is used again
 };
 
 }  // namespace ear::smoother

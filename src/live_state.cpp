@@ -1,7 +1,6 @@
 #include "src/live_state.h"
 
 #include "filter/ekf/propagation.h"
-#include "filter/ingest/stamp_guard.h"
 
 namespace ear {
 

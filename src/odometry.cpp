@@ -7,8 +7,7 @@
 #include <utility>
 
 #include "filter/filter.h"
-#include "filter/ingest/silence.h"
-#include "filter/ingest/stamp_guard.h"
+#include "filter/ingest/limits.h"
 #include "frontend/frontend.h"
 #include "src/event_log.h"
 #include "src/load_governor.h"

@@ -3,13 +3,12 @@
 #include <algorithm>
 #include <cassert>
 
+#include "filter/ekf/kernel_matrix.h"
+
 namespace ear {
 namespace {
 
 constexpr int kGroup = 4;  // rows that are summed up at a time
-
-ConstMatrix readable(const Eigen::MatrixXd& M) { return {M.data(), M.outerStride()}; }
-MutableMatrix writable(Eigen::MatrixXd& M) { return {M.data(), M.outerStride()}; }
 
 }  // namespace
 
@@ -70,7 +69,7 @@ void Covariance::inflate(int first, const Eigen::Ref<const Eigen::MatrixXd>& Q) 
   P_.block(first, first, Q.rows(), Q.cols()) += Q;
 }
 
-double Covariance::variance_of_row(const Eigen::Ref<const Eigen::RowVectorXd>& h, int first_column) const {
+double Covariance::variance(const Eigen::Ref<const Eigen::RowVectorXd>& h, int first_column) const {
   const auto n = h.size();
   double sum = 0.0;
   for (Eigen::Index j = 0; j < n; ++j) {
@@ -79,16 +78,17 @@ double Covariance::variance_of_row(const Eigen::Ref<const Eigen::RowVectorXd>& h
   return sum;
 }
 
-void Covariance::append_clone(const Eigen::Matrix<double, 6, err::imu_size>& J_clone_imu,
-                              const Eigen::Matrix<double, 6, 1>& J_clone_offset) {
+void Covariance::append_clone(const Eigen::Matrix<double, 6, 1>& J_offset) {
   assert(size_ + err::clone_size <= P_.cols());
   const int n = size_;
   auto rows = P_.block(n, 0, 6, n);
-  rows.noalias() = J_clone_imu * P_.topLeftCorner(err::imu_size, n);
-  rows.noalias() += J_clone_offset * P_.row(err::time_offset).leftCols(n);
+  rows.topRows<3>() = P_.block(err::theta, 0, 3, n);
+  rows.bottomRows<3>() = P_.block(err::rho, 0, 3, n);
+  rows.noalias() += J_offset * P_.row(err::time_offset).leftCols(n);
   P_.block(0, n, n, 6) = rows.transpose();
-  Eigen::Matrix<double, 6, 6> corner = rows.leftCols<err::imu_size>() * J_clone_imu.transpose();
-  corner.noalias() += rows.col(err::time_offset) * J_clone_offset.transpose();
+  Eigen::Matrix<double, 6, 6> corner;
+  corner << rows.middleCols<3>(err::theta), rows.middleCols<3>(err::rho);
+  corner.noalias() += rows.col(err::time_offset) * J_offset.transpose();
   P_.block<6, 6>(n, n) = 0.5 * (corner + corner.transpose());
   size_ += err::clone_size;
 }

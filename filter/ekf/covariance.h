@@ -1,4 +1,4 @@
-// The covariance of the error, behind one small interface, so that another form of it can take its place.
+// The covariance of the error, and what propagation, clones and updates do to it.
 #pragma once
 
 #include <Eigen/Core>
@@ -33,16 +33,11 @@ class Covariance {
   void inflate(int first, const Eigen::Ref<const Eigen::MatrixXd>& Q);
 
   /// Variance of the row h of the entries from `first_column` on.
-  template <typename Row>
-  [[nodiscard]] double variance(const Eigen::MatrixBase<Row>& h, int first_column) const {
-    const typename Row::PlainObject row = h;  // next to each other; those of a matrix's row are not
-    return variance_of_row(row, first_column);
-  }
+  [[nodiscard]] double variance(const Eigen::Ref<const Eigen::RowVectorXd>& h, int first_column) const;
 
-  /// Appends J * error, J: 6 x size. Only the columns of the inertial part and of the time offset are used: a clone is
-  /// taken where the vehicle is now.
-  void append_clone(const Eigen::Matrix<double, 6, err::imu_size>& J_clone_imu,
-                    const Eigen::Matrix<double, 6, 1>& J_clone_offset);
+  /// Appends a clone of theta and rho: it is taken where the vehicle is now. `J_offset`: how it moves by an error of
+  /// the time offset.
+  void append_clone(const Eigen::Matrix<double, 6, 1>& J_offset);
 
   /// Forgets `count` entries from `first` on.
   void remove(int first, int count);
@@ -56,8 +51,6 @@ class Covariance {
                                            int considered_count = 0);
 
  private:
-  [[nodiscard]] double variance_of_row(const Eigen::Ref<const Eigen::RowVectorXd>& h, int first_column) const;
-
   FilterKernels kernels_;
   Eigen::MatrixXd P_;  ///< with rows and columns beyond `capacity`, for the kernels
   int size_ = 0;

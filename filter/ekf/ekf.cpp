@@ -106,6 +106,15 @@ std::optional<TimeNs> Ekf::propagate(const ImuBuffer& samples, TimeNs t_ns, cons
   return uncertain_ns;
 }
 
+void Ekf::apply(GroundRows& z, double weight, CameraUpdate calibration) {
+  for (int row = 0; row < z.count; ++row) {
+    const double whitening = weight / z.sigma(row);
+    z.H.row(row) *= whitening;
+    z.residual(row) *= whitening;
+  }
+  if (z.count > 0) apply(z.H.topRows(z.count), err::nu, z.residual.head(z.count), calibration);
+}
+
 void Ekf::apply(const Eigen::Ref<const Eigen::MatrixXd>& H, int first_column,
                 const Eigen::Ref<const Eigen::VectorXd>& r, CameraUpdate calibration) {
   const int considered = calibration == CameraUpdate::learned ? 0 : err::calibration_size;
@@ -114,20 +123,17 @@ void Ekf::apply(const Eigen::Ref<const Eigen::MatrixXd>& H, int first_column,
   const Eigen::Ref<const Eigen::VectorXd> correction = covariance_.update(H, first_column, r, err::camera, considered);
   if (!correction.allFinite()) return;  // the covariance shows it: possible()
   bias_changes_.add(correction.segment<6>(err::b_g), before - variance());
-  boxplus_in_place(state_, correction);
+  boxplus(state_, correction);
 }
 
 /// If the frame was taken a moment later than its stamp, the vehicle moved on: this is how the time offset is seen.
 void Ekf::clone(double feature_noise) {
   const ImuState& x = state_.imu;
   const Eigen::Vector3d rate_W = x.R_WB * rate_B_;
-  Eigen::Matrix<double, 6, err::imu_size> J_imu = Eigen::Matrix<double, 6, err::imu_size>::Zero();
-  J_imu.block<3, 3>(0, err::theta).setIdentity();
-  J_imu.block<3, 3>(3, err::rho).setIdentity();
   Eigen::Matrix<double, 6, 1> J_offset;
   J_offset << rate_W, x.v_W + x.p_WB.cross(rate_W);
-  covariance_.append_clone(J_imu, J_offset);
-  state_.clones.push_back({next_frame_++, {x.R_WB, x.p_WB}, feature_noise});
+  covariance_.append_clone(J_offset);
+  state_.clones.push_back({next_frame_++, x.T_WB(), feature_noise});
 }
 
 void Ekf::marginalise(std::size_t clone) {

@@ -25,11 +25,11 @@ enum class CameraUpdate : std::uint8_t {
 
 /// Rows of wheels, lasers or the ground, linearised, not whitened: residual = H e + n, n independent, std(n) = sigma.
 /// Columns: ground_column().
-template <int kMax>
 struct GroundRows {
-  Eigen::Matrix<double, kMax, kGroundColumns> H = Eigen::Matrix<double, kMax, kGroundColumns>::Zero();
-  Eigen::Matrix<double, kMax, 1> residual = Eigen::Matrix<double, kMax, 1>::Zero();
-  Eigen::Matrix<double, kMax, 1> sigma = Eigen::Matrix<double, kMax, 1>::Ones();
+  static constexpr int size = 4;  ///< the most
+  Eigen::Matrix<double, size, kGroundColumns> H = Eigen::Matrix<double, size, kGroundColumns>::Zero();
+  Eigen::Matrix<double, size, 1> residual = Eigen::Matrix<double, size, 1>::Zero();
+  Eigen::Matrix<double, size, 1> sigma = Eigen::Matrix<double, size, 1>::Ones();
   int count = 0;
 };
 
@@ -62,26 +62,13 @@ class Ekf {
                                   double normal_walk);
 
   /// The gate: one row of ground columns against what the state and its own noise allow.
-  template <typename Row>
-  [[nodiscard]] Innovation test(const Eigen::MatrixBase<Row>& h, double residual, double sigma) const {
-    Innovation innovation;
-    innovation.value = residual;
-    innovation.variance = covariance_.variance(h, err::nu) + sigma * sigma;
-    innovation.gate = gate_.quantile(1);
-    innovation.fits = gate_.fits(residual, innovation.variance);
-    return innovation;
+  [[nodiscard]] Innovation test(const Eigen::Matrix<double, 1, kGroundColumns>& h, double residual,
+                                double sigma) const {
+    return Innovation::of(residual, covariance_.variance(h, err::nu) + sigma * sigma, gate_.quantile(1));
   }
 
   /// Updates once with all rows, their noise divided by `weight`. They are whitened in place.
-  template <int kMax>
-  void apply(GroundRows<kMax>& z, double weight, CameraUpdate calibration) {
-    for (int row = 0; row < z.count; ++row) {
-      const double whitening = weight / z.sigma(row);
-      z.H.row(row) *= whitening;
-      z.residual(row) *= whitening;
-    }
-    if (z.count > 0) apply(z.H.topRows(z.count), err::nu, z.residual.head(z.count), calibration);
-  }
+  void apply(GroundRows& z, double weight, CameraUpdate calibration);
 
   /// Updates by whitened rows: residual = H e(first_column ...) + n, cov(n) = I.
   void apply(const Eigen::Ref<const Eigen::MatrixXd>& H, int first_column, const Eigen::Ref<const Eigen::VectorXd>& r,

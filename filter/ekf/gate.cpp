@@ -4,7 +4,9 @@
 #include <cmath>
 
 namespace ear {
+namespace {
 
+/// Probability that a chi-squared variable of `dof` degrees of freedom is below x.
 double chi_squared_probability(double x, int dof) {
   if (x <= 0.0) return 0.0;
   // Regularized incomplete gamma function by its series, Abramowitz and Stegun 6.5.29.
@@ -18,6 +20,8 @@ double chi_squared_probability(double x, int dof) {
   }
   return std::min(sum, 1.0);
 }
+
+}  // namespace
 
 Gate::Gate(double probability, int max_dof) {
   quantiles_.reserve(static_cast<std::size_t>(max_dof));

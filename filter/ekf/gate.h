@@ -17,22 +17,13 @@ class Gate {
   /// The quantile; the largest dof stands for all above.
   [[nodiscard]] double quantile(int dof) const;
 
-  /// One innovation of this variance.
-  [[nodiscard]] bool fits(double innovation, double variance) const {
-    return innovation * innovation <= quantile(1) * variance;
-  }
-  /// A sum of squares of `dof` innovations, each of this variance.
-  [[nodiscard]] bool fits_squares(double squares, double variance, int dof) const {
+  /// A sum of squares of `dof` innovations, each of this variance. With variance 1: r^T S^-1 r.
+  [[nodiscard]] bool fits(double squares, double variance, int dof) const {
     return squares <= quantile(dof) * variance;
   }
-  /// `squared_distance`: r^T S^-1 r of `dof` degrees of freedom.
-  [[nodiscard]] bool fits_distance(double squared_distance, int dof) const { return squared_distance <= quantile(dof); }
 
  private:
   std::vector<double> quantiles_;  // [dof - 1]
 };
-
-/// Probability that a chi-squared variable of `dof` degrees of freedom is below x.
-[[nodiscard]] double chi_squared_probability(double x, int dof);
 
 }  // namespace ear

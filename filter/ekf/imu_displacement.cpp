@@ -29,8 +29,7 @@ ImuMotion imu_motion(const ImuState& x, const ImuBuffer& samples, TimeNs to_ns, 
   const ErrorTransition error = error_transition(begin, turned_B / motion.duration, gained_B / motion.duration,
                                                  motion.duration, with_factors(imu, worst));
   const Eigen::Matrix3d R_BW = x.R_WB.transpose();
-  motion.p_BiBj = R_BW * end.p_WB;
-  motion.R_BiBj = R_BW * end.R_WB;
+  motion.T_BiBj = {R_BW * end.R_WB, R_BW * end.p_WB};
   Eigen::Matrix<double, 3, err::imu_size> H_end = Eigen::Matrix<double, 3, err::imu_size>::Zero();
   H_end.middleCols<3>(err::theta) = -R_BW * skew(end.p_WB);
   H_end.middleCols<3>(err::rho) = R_BW;
@@ -42,7 +41,7 @@ ImuMotion imu_motion(const ImuState& x, const ImuBuffer& samples, TimeNs to_ns, 
 
 Displacement imu_displacement(const ImuMotion& motion, const Covariance& P) {
   Displacement result;
-  result.p_BiBj = motion.p_BiBj;
+  result.p_BiBj = motion.T_BiBj.p;
   result.covariance = motion.by_state(P) + motion.covariance;
   result.available = motion.duration > 0.0 && result.p_BiBj.allFinite() && result.covariance.allFinite();
   return result;

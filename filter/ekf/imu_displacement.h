@@ -14,8 +14,7 @@ namespace ear {
 /// The IMU's samples from i to j, from the state at i on. Vectors are in B_i.
 struct ImuMotion {
   double duration = 0.0;  ///< [s]
-  Eigen::Vector3d p_BiBj = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d R_BiBj = Eigen::Matrix3d::Identity();
+  Pose T_BiBj;
   Eigen::Matrix<double, 3, err::imu_size> H = Eigen::Matrix<double, 3, err::imu_size>::Zero();  ///< p by the error at i
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< of p, by the noise of the samples meanwhile [m^2]
   double turn_variance = 0.0;                            ///< of R, one axis, by the same [rad^2]

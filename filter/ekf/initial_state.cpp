@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "filter/ekf/so3.h"
-#include "filter/ingest/silence.h"
+#include "filter/ingest/limits.h"
 
 namespace ear {
 namespace {
@@ -72,33 +72,38 @@ const FilterConfig& checked(const FilterConfig& config) {
 }
 
 const Calibration& checked(const Calibration& calibration) {
+  const auto require_rotation = [](const Eigen::Isometry3d& T, const char* what) {
+    const Eigen::Matrix3d R = T.linear();
+    require((R * R.transpose() - Eigen::Matrix3d::Identity()).norm() < 1e-3 && R.determinant() > 0.0, what);
+  };
+  const auto require_offset = [](double seconds, const char* what) {
+    require(std::abs(seconds) <= kLargestTimeOffset, what);
+  };
   require(!calibration.cameras.empty() || calibration.encoder, "calibration: a camera or wheels are needed");
   require(calibration.cameras.size() <= 2, "calibration: at most two cameras");
   for (const CameraCalibration& camera : calibration.cameras) {
     require(camera.fu > 0.0 && camera.fv > 0.0, "calibration: a camera's focal lengths must be positive");
-    const Eigen::Matrix3d R = camera.T_BC.linear();
-    require((R * R.transpose() - Eigen::Matrix3d::Identity()).norm() < 1e-3 && R.determinant() > 0.0,
-            "calibration: a camera's T_BS holds no rotation");
+    require_rotation(camera.T_BC, "calibration: a camera's T_BS holds no rotation");
   }
-  require(std::abs(calibration.camera_time_offset) <= kLargestTimeOffset,
-          "calibration: camera_time_offset must be a number of seconds, at most an hour");
+  require_offset(calibration.camera_time_offset,
+                 "calibration: camera_time_offset must be a number of seconds, at most an hour");
   require(calibration.imu.gyro_noise > 0.0 && calibration.imu.accel_noise > 0.0,
           "calibration: imu noise must be positive");
+  require(calibration.imu.rate_hz > 0.0 && std::isfinite(calibration.imu.rate_hz),
+          "calibration: imu rate_hz must be a positive number");
   if (const auto& encoder = calibration.encoder) {
     require(encoder->wheel_radius[0] > 0.0 && encoder->wheel_radius[1] > 0.0,
             "calibration: wheel_radius must be positive");
     require(encoder->track_width > 0.0, "calibration: track_width must be positive");
     require(encoder->resolution > 0, "calibration: encoder resolution must be positive");
-    require(std::abs(encoder->time_offset) <= kLargestTimeOffset,
-            "calibration: the encoder's time_offset must be a number of seconds, at most an hour");
-    const Eigen::Matrix3d R = encoder->T_BO.linear();
-    require((R * R.transpose() - Eigen::Matrix3d::Identity()).norm() < 1e-3 && R.determinant() > 0.0,
-            "calibration: the encoder's T_BS holds no rotation");
+    require_offset(encoder->time_offset,
+                   "calibration: the encoder's time_offset must be a number of seconds, at most an hour");
+    require_rotation(encoder->T_BO, "calibration: the encoder's T_BS holds no rotation");
   }
   if (const auto& lasers = calibration.lasers) {
     require(lasers->beams.size() <= kMaxBeams, "calibration: at most three laser beams");
-    require(std::abs(lasers->time_offset) <= kLargestTimeOffset,
-            "calibration: the lasers' time_offset must be a number of seconds, at most an hour");
+    require_offset(lasers->time_offset,
+                   "calibration: the lasers' time_offset must be a number of seconds, at most an hour");
     for (const LaserBeam& beam : lasers->beams) {
       require(std::abs(beam.d_B.norm() - 1.0) < 1e-2, "calibration: a laser's direction must have length one");
     }
@@ -111,9 +116,7 @@ const Calibration& checked(const Calibration& calibration) {
 /// standard deviation of one.
 FilterConfig settings_for(const FilterConfig& config, const Calibration& calibration) {
   FilterConfig result = config;
-  if (calibration.imu.rate_hz > 0.0) {
-    result.max_imu_gap = std::max(config.max_imu_gap, kMissed / calibration.imu.rate_hz);
-  }
+  result.max_imu_gap = std::max(config.max_imu_gap, kMissed / calibration.imu.rate_hz);
   PriorConfig& prior = result.prior;
   const auto state_pose = [](const std::optional<PoseSigma>& sigma, double& rotation, double& position) {
     if (!sigma) return;
@@ -144,6 +147,12 @@ FilterConfig settings_for(const FilterConfig& config, const Calibration& calibra
   }
   if (calibration.lasers) prior.beam_offset = calibration.lasers->offset_sigma.value_or(prior.beam_offset);
   return result;
+}
+
+bool has_beams(const Calibration& calibration) { return calibration.lasers && !calibration.lasers->beams.empty(); }
+
+bool uses_wheels(const FilterConfig& config, const Calibration& calibration) {
+  return calibration.encoder && config.odometer.model != OdometerModel::none;
 }
 
 double focal_length(const Calibration& calibration) {

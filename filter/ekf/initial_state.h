@@ -22,6 +22,10 @@ inline constexpr double kShakenAccel = 0.02;
 /// FilterConfig::prior, and an IMU whose usual interval is long has no gap at each. Both are usable.
 [[nodiscard]] FilterConfig settings_for(const FilterConfig& config, const Calibration& calibration);
 
+/// Are there laser beams?
+[[nodiscard]] bool has_beams(const Calibration& calibration);
+/// Are there wheels that are used?
+[[nodiscard]] bool uses_wheels(const FilterConfig& config, const Calibration& calibration);
 /// Pixels per unit of normalized coordinates; 1 without a camera, where nothing is measured in pixels.
 [[nodiscard]] double focal_length(const Calibration& calibration);
 

@@ -1,13 +1,14 @@
 // The score of one sensor, from how its innovations have fitted over the last moments: its noise is divided by it at
 // every update. Variational noise adaptation (Sarkka and Nummenmaa 2009): the factor on the noise's variance has an
 // inverse-gamma belief, whose mean follows the innovations. One that is far off raises it before it is used, which is
-// a Student-t update; many raise it for all. It forgets in seconds, whatever the sensor's rate. docs/filter.md,
+// a Student-t update; many raise it for all. It forgets with time, whatever the sensor's rate. docs/filter.md,
 // "Wheels".
 #pragma once
 
 #include <optional>
 
 #include "ear/types.h"
+#include "filter/ekf/records.h"
 
 namespace ear {
 
@@ -32,6 +33,11 @@ class NoiseScore {
   /// contradicts weighs less and less, but never nothing: the state may be what is wrong, and the pull that is left
   /// brings it back.
   double add(double residual, const Expected& expected, TimeNs t_ns);
+  /// The same of an innovation whose variance has the noise's, `sigma` squared, as a part.
+  double add(const Innovation& innovation, double sigma, bool adapts, TimeNs t_ns) {
+    const double noise = sigma * sigma;
+    return add(innovation.value, {innovation.variance - noise, noise, adapts}, t_ns);
+  }
 
   /// In (0, 1]: 1 over the root of the believed factor.
   [[nodiscard]] double weight() const;

@@ -1,6 +1,7 @@
 #include "filter/ekf/propagation.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace ear {
 

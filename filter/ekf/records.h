@@ -18,17 +18,34 @@ struct Innovation {
   double gate = 0.0;      ///< quantile of value^2 / variance
   bool fits = false;      ///< it passed the gate
   double score = 1.0;     ///< SourceRecord::score
+
+  [[nodiscard]] static Innovation of(double value, double variance, double gate) {
+    return {value, variance, gate, value * value <= gate * variance};
+  }
 };
 
 /// One record a sensor: its last innovation, and how many fitted.
 class InnovationLog {
  public:
   /// A new frame: counts start from zero; what was measured last stays.
-  void start_frame();
+  void start_frame() {
+    for (SourceRecord& record : records_) record.used = record.rejected = 0;
+  }
 
-  void add(Source source, const Innovation& innovation, TimeNs t_ns);
+  void add(Source source, const Innovation& innovation, TimeNs t_ns) {
+    add(source, innovation, innovation.fits ? 1 : 0, innovation.fits ? 0 : 1, t_ns);
+  }
   /// Many at once, of which so many fitted: the features of one camera. `typical`: the root of their mean square.
-  void add(Source source, const Innovation& typical, int used, int rejected, TimeNs t_ns);
+  void add(Source source, const Innovation& typical, int used, int rejected, TimeNs t_ns) {
+    SourceRecord& record = records_[index_of(source)];
+    record.innovation = typical.value;
+    record.variance = typical.variance;
+    record.gate_ratio = typical.value * typical.value / (typical.gate * typical.variance);
+    record.score = typical.score;
+    record.used += used;
+    record.rejected += rejected;
+    if (used > 0) record.last_used_ns = t_ns;
+  }
 
   /// SourceRecord::score of a sensor that is no innovation's.
   void set_score(Source source, double score) { records_[index_of(source)].score = score; }

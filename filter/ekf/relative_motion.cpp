@@ -4,19 +4,18 @@
 
 namespace ear {
 
-RelativeMotionRows linearize_relative_motion(const State& x, int i, const Pose& T_B0B1) {
-  const Pose& from = x.clones[static_cast<std::size_t>(i)].T_WB;
-  const Pose measured = {from.R * T_B0B1.R, from.p + from.R * T_B0B1.p};
-  RelativeMotionRows rows;
-  rows.residual.head<3>() = log_so3(measured.R * x.imu.R_WB.transpose());
-  rows.residual.tail<3>() = measured.p - x.imu.p_WB;
-  rows.H.block<3, 3>(0, err::theta).setIdentity();
-  rows.H.block<3, 3>(3, err::theta) = -skew(x.imu.p_WB);
-  rows.H.block<3, 3>(3, err::rho).setIdentity();
-  rows.H_clone.topLeftCorner<3, 3>() = -Eigen::Matrix3d::Identity();
-  rows.H_clone.bottomLeftCorner<3, 3>() = skew(measured.p);
-  rows.H_clone.bottomRightCorner<3, 3>() = -Eigen::Matrix3d::Identity();
-  return rows;
+void linearize_relative_motion(const State& x, const Pose& T_B0B1, Eigen::Ref<Eigen::MatrixXd> H,
+                               Eigen::Ref<Eigen::Matrix<double, 6, 1>> residual) {
+  const Pose measured = x.clones.back().T_WB * T_B0B1;
+  residual << log_so3(measured.R * x.imu.R_WB.transpose()), measured.p - x.imu.p_WB;
+  H.setZero();
+  H.block<3, 3>(0, err::theta).setIdentity();
+  H.block<3, 3>(3, err::theta) = -skew(x.imu.p_WB);
+  H.block<3, 3>(3, err::rho).setIdentity();
+  auto H_clone = H.rightCols<err::clone_size>();
+  H_clone.topLeftCorner<3, 3>() = -Eigen::Matrix3d::Identity();
+  H_clone.bottomLeftCorner<3, 3>() = skew(measured.p);
+  H_clone.bottomRightCorner<3, 3>() = -Eigen::Matrix3d::Identity();
 }
 
 }  // namespace ear

@@ -1,5 +1,5 @@
-// The state, and what an error of it means. Only boxplus and boxminus know the error's definition (docs/filter.md,
-// "State and error"):
+// The state, and what an error of it means. Only boxplus knows the error's definition (docs/filter.md, "State and
+// error"):
 //   R = Exp(theta) R^, v = Exp(theta) v^ + nu, p = Exp(theta) p^ + rho; clones alike; n = Exp(theta) Exp(B delta) n^;
 //   biases and calibration additive, wheels relative, rotations of the cameras R = Exp(phi) R^, of the odometer
 //   R = R^ Exp(phi).
@@ -51,6 +51,13 @@ inline constexpr int kGroundColumns = err::camera - err::nu;
 struct Pose {
   Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
   Eigen::Vector3d p = Eigen::Vector3d::Zero();
+
+  /// T_AC = T_AB * T_BC.
+  [[nodiscard]] Pose operator*(const Pose& T) const { return {R * T.R, R * T.p + p}; }
+  [[nodiscard]] Pose inverse() const {
+    const Eigen::Matrix3d R_inverse = R.transpose();
+    return {R_inverse, -(R_inverse * p)};
+  }
 };
 
 /// The inertial part: what IMU samples propagate.
@@ -61,6 +68,8 @@ struct ImuState {
   Eigen::Vector3d p_WB = Eigen::Vector3d::Zero();
   Eigen::Vector3d b_g = Eigen::Vector3d::Zero();
   Eigen::Vector3d b_a = Eigen::Vector3d::Zero();
+
+  [[nodiscard]] Pose T_WB() const { return {R_WB, p_WB}; }
 };
 
 /// The plane that the wheels stand on.
@@ -100,8 +109,12 @@ struct CameraState {
 };
 
 /// A camera's stamp by the clock of the IMU, and the reverse.
-[[nodiscard]] TimeNs imu_time(TimeNs camera_time_ns, const CameraState& camera);
-[[nodiscard]] TimeNs camera_time(TimeNs imu_time_ns, const CameraState& camera);
+[[nodiscard]] inline TimeNs imu_time(TimeNs camera_time_ns, const CameraState& camera) {
+  return later_by(camera.time_offset, camera_time_ns);
+}
+[[nodiscard]] inline TimeNs camera_time(TimeNs imu_time_ns, const CameraState& camera) {
+  return later_by(-camera.time_offset, imu_time_ns);
+}
 
 /// The body's pose at a past frame.
 struct Clone {
@@ -123,11 +136,7 @@ struct State {
 /// Two unit vectors, as columns, that span the plane perpendicular to the unit vector n; smooth except at n = -z.
 [[nodiscard]] Eigen::Matrix<double, 3, 2> tangent_basis(const Eigen::Vector3d& n);
 
-/// x with the error d applied; d has x.error_size() entries.
-void boxplus_in_place(State& x, const Eigen::Ref<const Eigen::VectorXd>& d);
-[[nodiscard]] State boxplus(const State& x, const Eigen::Ref<const Eigen::VectorXd>& d);
-
-/// The error d for which boxplus(estimate, d) is `truth`. Both have the same clones.
-[[nodiscard]] Eigen::VectorXd boxminus(const State& truth, const State& estimate);
+/// Applies the error d, which has x.error_size() entries.
+void boxplus(State& x, const Eigen::Ref<const Eigen::VectorXd>& d);
 
 }  // namespace ear

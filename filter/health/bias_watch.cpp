@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "filter/ingest/silence.h"
+#include "filter/ingest/limits.h"
 
 namespace ear {
 namespace {
@@ -31,7 +31,7 @@ BiasJump BiasWatch::judge(const BiasChanges& changes, TimeNs t_ns) {
     if (std::abs(moved_(i)) > (gyro ? kGyroFault : kAccelFault)) (gyro ? jump.fault.gyro : jump.fault.accel) = true;
     sum_.correction(i) = sum_.variance_lowered(i) = 0.0;
   }
-  const double dt = seconds_between(judged_ns_, t_ns);
+  const double dt = judged_ns_ ? seconds_between(*judged_ns_, t_ns) : INFINITY;
   const double kept = std::exp(-dt / kStale);
   judged_ns_ = t_ns;
   sum_.correction *= kept;

@@ -3,6 +3,8 @@
 // that is elsewhere: by as much as was observed, no more. docs/filter.md, "Gaps and jumps".
 #pragma once
 
+#include <optional>
+
 #include "ear/types.h"
 #include "filter/ekf/records.h"
 #include "filter/ingest/imu_spike.h"
@@ -24,13 +26,13 @@ struct BiasJump {
 class BiasWatch {
  public:
   /// What all updates since the last call did, the state now being at `t_ns`. What speaks for a jump is forgotten when
-  /// it was found.
+  /// it was found, and after the first call.
   BiasJump judge(const BiasChanges& changes, TimeNs t_ns);
 
  private:
   BiasChanges sum_;                                            ///< since the last jump
   BiasChanges::Vector6 moved_ = BiasChanges::Vector6::Zero();  ///< by jumps and all, of late
-  TimeNs judged_ns_ = 0;
+  std::optional<TimeNs> judged_ns_;
 };
 
 }  // namespace ear

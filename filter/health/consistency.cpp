@@ -18,7 +18,7 @@ double distance_between(const Displacement& x, const Displacement& y, AnomalySco
 }
 
 /// Of so many displacements against one that is common to all.
-constexpr int degrees_of_freedom(std::size_t count) { return 3 * static_cast<int>(count - 1); }
+constexpr int degrees_of_freedom(int count) { return 3 * (count - 1); }
 
 /// (13) [m^2], over the displacements there are.
 double variance_of(const Displacements& displacements, int count) {
@@ -96,7 +96,7 @@ Consistency ConsistencyCheck::operator()(const Displacements& displacements) con
     result.threshold = config_.distance;
   } else {
     result.score = std::sqrt(chi_squared_of(displacements));
-    result.threshold = std::sqrt(gate_.quantile(degrees_of_freedom(static_cast<std::size_t>(count))));
+    result.threshold = std::sqrt(gate_.quantile(degrees_of_freedom(count)));
   }
   if (count < static_cast<int>(kMotionSensors) || !result.disagree()) return result;
 

@@ -10,7 +10,7 @@ namespace ear {
 /// Mostly wrong for kFaultyAfter, it is faulty; mostly right for kSoundAfter, it is sound again.
 class FaultState {
  public:
-  static constexpr TimeNs kFaultyAfter = 250'000'000;  // [ns] chosen: docs/health.md promises half a second
+  static constexpr TimeNs kFaultyAfter = 250'000'000;  // [ns] chosen; docs/health.md
   static constexpr TimeNs kSoundAfter = 500'000'000;   // [ns] chosen; a lost estimate must fit for so long, too
 
   /// What came since the last call: wrong or right. Long silence counts for kFaultyAfter at most.

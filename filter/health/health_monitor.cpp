@@ -2,8 +2,7 @@
 
 #include <algorithm>
 
-#include "filter/ingest/evidence.h"
-#include "filter/ingest/silence.h"
+#include "filter/ingest/limits.h"
 
 namespace ear {
 namespace {
@@ -73,8 +72,7 @@ void HealthMonitor::add_refused_imu() {
   decide(*arrivals_.imu_ns);
 }
 
-void HealthMonitor::add_imu(const ImuSample& sample, double max_gap) {
-  const TimeNs t_ns = sample.t_ns;
+void HealthMonitor::add_imu(TimeNs t_ns, double max_gap) {
   if (arrivals_.imu_ns && seconds_between(*arrivals_.imu_ns, t_ns) > max_gap) {
     report({Source::gyroscope, Source::accelerometer}, t_ns);
   }
@@ -93,7 +91,8 @@ void HealthMonitor::report_camera_fault(TimeNs t_ns) {
 }
 
 void HealthMonitor::add_encoder(Verdict verdict, TimeNs imu_ns) {
-  arrivals_.encoder_interval = std::min(seconds_between(arrivals_.encoder_ns, imu_ns), kStale);
+  const double since = arrivals_.encoder_ns ? seconds_between(*arrivals_.encoder_ns, imu_ns) : kStale;
+  arrivals_.encoder_interval = std::min(since, kStale);
   arrivals_.encoder_ns = imu_ns;
   if (verdict == Verdict::impossible) report({Source::wheel_left, Source::wheel_right}, imu_ns);
 }
@@ -144,14 +143,15 @@ void HealthMonitor::add_frame(const Frame& frame, const std::array<SourceRecord,
   FrameStatistics& now = last_.statistics;
   if (now.wheel_rows_used + now.wheel_rows_rejected > 0) {
     arrivals_.wheel_rows_ns = t_ns;
-  } else if (now.on_ground &&
-             seconds_between(arrivals_.wheel_rows_ns, t_ns) < longest_silence(arrivals_.encoder_interval)) {
+  } else if (now.on_ground && arrivals_.wheel_rows_ns &&
+             seconds_between(*arrivals_.wheel_rows_ns, t_ns) < longest_silence(arrivals_.encoder_interval)) {
     now.wheel_rows_used = before.statistics.wheel_rows_used;
     now.wheel_rows_rejected = before.statistics.wheel_rows_rejected;
   }
   arrivals_.refused_imu_ns.reset();
-  if (frame.image)
-    images_.add({t_ns, arrivals_.imu_ns.value_or(t_ns), frame.running, frame.agreement, frame.statistics});
+  if (frame.image) {
+    images_.add(t_ns, arrivals_.imu_ns.value_or(t_ns), frame.running, frame.agreement, frame.statistics);
+  }
   if (wheels_) judge_ground(frame, records);
   for (const Source source : {Source::gyroscope, Source::accelerometer}) {
     faults_[index_of(source)].add(records[index_of(source)].rejected > 0, t_ns);
@@ -162,7 +162,7 @@ void HealthMonitor::add_frame(const Frame& frame, const std::array<SourceRecord,
   health_.horizontal_sigma = frame.horizontal_sigma;
   health_.vertical_sigma = frame.vertical_sigma;
   decide(t_ns);
-  health_.quality = usable() ? quality(health_, last_.statistics.tracks) : 0;
+  if (usable()) health_.quality = quality(health_, last_.statistics.tracks);
 }
 
 /// Wheels and beams have something to show on the ground only.
@@ -172,19 +172,22 @@ void HealthMonitor::judge_ground(const Frame& frame, const std::array<SourceReco
       faults_[i].clear(frame.t_ns);
     return;
   }
-  const auto judge = [&](Source source, bool silent) {
+  const auto judge = [&](Source source, bool nothing_came) {
     const SourceRecord& record = records[index_of(source)];
     const int measured = record.used + record.rejected;
     FaultState& fault = faults_[index_of(source)];
     if (measured > 0) {
       fault.add(record.rejected > kMajority * measured, frame.t_ns);
-    } else if (silent) {
+    } else if (nothing_came) {
       fault.add(true, frame.t_ns);
     }
   };
   const TimeNs now_ns = arrivals_.imu_ns.value_or(frame.t_ns);
-  const bool no_reading = seconds_between(arrivals_.encoder_ns, now_ns) > longest_silence(arrivals_.encoder_interval);
-  const bool no_range = seconds_between(arrivals_.laser_ns, now_ns) > longest_silence(0.0);
+  const auto silent = [now_ns](const std::optional<TimeNs>& last_ns, double interval) {
+    return !last_ns || seconds_between(*last_ns, now_ns) > longest_silence(interval);
+  };
+  const bool no_reading = silent(arrivals_.encoder_ns, arrivals_.encoder_interval);
+  const bool no_range = silent(arrivals_.laser_ns, 0.0);
   if (!frame.lifted) {
     for (const Source wheel : {Source::wheel_left, Source::wheel_right}) judge(wheel, no_reading);
   }

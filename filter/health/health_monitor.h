@@ -25,8 +25,8 @@ class HealthMonitor {
   /// For an estimator that begins anew: lost from `t_ns` on, if the one before had an estimate.
   void succeed(const HealthMonitor& before, TimeNs t_ns);
 
-  /// A sample as it comes, before it is used.
-  void add_imu(const ImuSample& sample, double max_gap);
+  /// The stamp of a sample as it comes, before it is used.
+  void add_imu(TimeNs t_ns, double max_gap);
   /// One whose stamp or values cannot be.
   void add_refused_imu();
   /// What only a fault of the sensor does: a spike, a clipped value, a bias that jumps.
@@ -42,8 +42,8 @@ class HealthMonitor {
   void add_refused_frame(TimeNs imu_ns);
 
   /// May this image be used? See ImageHealth::check.
-  [[nodiscard]] bool check_image(const FrameAgreement& agreement, TimeNs t_ns, TimeNs newest_imu_ns) {
-    return images_.check(agreement, t_ns, newest_imu_ns);
+  [[nodiscard]] bool check_image(const FrameAgreement& agreement, TimeNs t_ns) {
+    return images_.check(agreement, t_ns, arrivals_.imu_ns.value_or(t_ns));
   }
 
   /// What is known after a frame was used.
@@ -89,10 +89,10 @@ class HealthMonitor {
   /// Stamps [ns] of what came last.
   struct Arrivals {
     std::optional<TimeNs> imu_ns;
-    std::optional<TimeNs> refused_imu_ns;  ///< the newest inertial one at the last refused frame
-    TimeNs encoder_ns = 0, laser_ns = 0;   ///< newest inertial stamp when they came
-    TimeNs wheel_rows_ns = 0;              ///< of the last frame for which the wheels measured something
-    double encoder_interval = 0.0;         ///< [s] between the last two
+    std::optional<TimeNs> refused_imu_ns;        ///< the newest inertial one at the last refused frame
+    std::optional<TimeNs> encoder_ns, laser_ns;  ///< newest inertial stamp when they came
+    std::optional<TimeNs> wheel_rows_ns;         ///< of the last frame for which the wheels measured something
+    double encoder_interval = 0.0;               ///< [s] between the last two
   };
   /// Since when the estimator is what it is.
   struct Life {

@@ -3,8 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "filter/ingest/evidence.h"
-#include "filter/ingest/silence.h"
+#include "filter/ingest/limits.h"
 #include "filter/ingest/stream_clock.h"
 
 namespace ear {
@@ -19,6 +18,19 @@ bool crossed(const FrameAgreement& seen) { return seen.behind > kMajority; }
 
 }  // namespace
 
+bool StampWatch::add(TimeNs stamp_ns, TimeNs imu_ns) {
+  const double passed = std::clamp(seconds_between(last_imu_ns_, imu_ns) / kSlopeMemory, 0.0, 1.0);
+  const double share = std::max(passed, 1.0 / (count_ + 1));
+  last_imu_ns_ = imu_ns;
+  const double off = seconds_between(imu_ns, stamp_ns) - usual_;
+  const bool unusual = count_ >= kToKnow && std::abs(off) > std::max(kClockJump, kClear * std::sqrt(variance_));
+  const double counted = std::clamp(off, -kClockJump, kClockJump);  // what is usual changes slowly
+  usual_ += share * counted;
+  variance_ += share * (counted * counted - variance_);
+  ++count_;
+  return unusual;
+}
+
 bool ImageHealth::check(const FrameAgreement& seen, TimeNs t_ns, TimeNs newest_imu_ns) {
   stamps_unusual_ = stamps_.add(t_ns, newest_imu_ns);
   const bool elsewhere = seen.matches > 0 && seen.left > kMajority;
@@ -26,37 +38,37 @@ bool ImageHealth::check(const FrameAgreement& seen, TimeNs t_ns, TimeNs newest_i
   return !seen.frozen && !crossed(seen) && !stamps_wrong_;
 }
 
-void ImageHealth::add(const Image& image) {
+void ImageHealth::add(TimeNs t_ns, TimeNs newest_imu_ns, bool running, const FrameAgreement& seen,
+                      const FrameStatistics& statistics) {
   if (arrival_ns_) {
-    const double interval = std::min(seconds_between(last_ns_, image.t_ns), kStale);
+    const double interval = std::min(seconds_between(last_ns_, t_ns), kStale);
     interval_ += (interval_ == 0.0 ? 1.0 : 1.0 / kToKnow) * (interval - interval_);
   }
-  last_ns_ = image.t_ns;
-  arrival_ns_ = std::max(image.t_ns, image.newest_imu_ns);
-  if (cameras_ > 0) judge(image);
-  late_ = stamps_unusual_ && !stamps_wrong_ && image.seen.matches > 0 && image.seen.left < kMajority;
-  if (stamps_unusual_) report(image.t_ns);
+  last_ns_ = t_ns;
+  arrival_ns_ = std::max(t_ns, newest_imu_ns);
+  if (cameras_ > 0) judge(t_ns, running, seen, statistics);
+  late_ = stamps_unusual_ && !stamps_wrong_ && seen.matches > 0 && seen.left < kMajority;
+  if (stamps_unusual_) report(t_ns);
 }
 
-void ImageHealth::judge(const Image& image) {
-  const FrameAgreement& seen = image.seen;
-  const bool known = image.running && seen.matches > 0;
-  const int tracks = image.statistics.tracks;
+void ImageHealth::judge(TimeNs t_ns, bool running, const FrameAgreement& seen, const FrameStatistics& statistics) {
+  const bool known = running && seen.matches > 0;
+  const int tracks = statistics.tracks;
   const bool blind = tracks < kFewFeatures;
   const bool poor = blind || tracks < kSparse * usual_tracks_ || seen.noise > 1.0;
   const double share = std::max(interval_ / kTracksMemory, 1.0 / (1.0 + counted_));
   usual_tracks_ += share * (tracks - usual_tracks_);
   ++counted_;
   const double kept = std::exp(-interval_ / kFitMemory);
-  used_ = kept * used_ + image.statistics.features_used;
-  rejected_ = kept * rejected_ + image.statistics.features_rejected;
-  carrying_.add(blind || misfit() || (known && seen.left > kMajority), image.t_ns);
-  left_.add(poor || misfit() || (known && seen.left > kSomeOff), image.t_ns);
+  used_ = kept * used_ + statistics.features_used;
+  rejected_ = kept * rejected_ + statistics.features_rejected;
+  carrying_.add(blind || misfit() || (known && seen.left > kMajority), t_ns);
+  left_.add(poor || misfit() || (known && seen.left > kSomeOff), t_ns);
   if (cameras_ == 2 && !seen.right_skipped) {
-    const bool one_eyed = image.statistics.stereo < kSparse * tracks;
-    right_.add(poor || one_eyed || (known && seen.right > kSomeOff), image.t_ns);
+    const bool one_eyed = statistics.stereo < kSparse * tracks;
+    right_.add(poor || one_eyed || (known && seen.right > kSomeOff), t_ns);
   }
-  if (seen.frozen || crossed(seen)) report(image.t_ns);
+  if (seen.frozen || crossed(seen)) report(t_ns);
 }
 
 void ImageHealth::add_silence(TimeNs t_ns) {

@@ -6,10 +6,22 @@
 #include "ear/estimate.h"
 #include "ear/types.h"
 #include "filter/health/fault_state.h"
-#include "filter/health/stamp_watch.h"
 #include "filter/sources/cameras/frame_agreement.h"
 
 namespace ear {
+
+/// By how much a sensor's stamps are off those of the inertial samples, against what is usual.
+class StampWatch {
+ public:
+  /// A stamp, and that of the newest inertial sample. Is the difference an unusual one?
+  bool add(TimeNs stamp_ns, TimeNs imu_ns);
+
+ private:
+  TimeNs last_imu_ns_ = 0;
+  int count_ = 0;
+  double usual_ = 0.0;     ///< [s]
+  double variance_ = 0.0;  ///< [s^2] of the distance from it
+};
 
 class ImageHealth {
  public:
@@ -23,14 +35,8 @@ class ImageHealth {
   [[nodiscard]] bool check(const FrameAgreement& seen, TimeNs t_ns, TimeNs newest_imu_ns);
 
   /// An image at `t_ns`, after it was used or not. `running`: there is a state.
-  struct Image {
-    TimeNs t_ns = 0;
-    TimeNs newest_imu_ns = 0;
-    bool running = false;
-    FrameAgreement seen;
-    FrameStatistics statistics;
-  };
-  void add(const Image& image);
+  void add(TimeNs t_ns, TimeNs newest_imu_ns, bool running, const FrameAgreement& seen,
+           const FrameStatistics& statistics);
   /// No image came for too long.
   void add_silence(TimeNs t_ns);
   /// Something that never happens to sound cameras.
@@ -47,7 +53,7 @@ class ImageHealth {
   [[nodiscard]] const FaultState& right() const { return right_; }
 
  private:
-  void judge(const Image& image);
+  void judge(TimeNs t_ns, bool running, const FrameAgreement& seen, const FrameStatistics& statistics);
 
   std::size_t cameras_;
   FaultState left_, right_;

@@ -4,16 +4,13 @@
 #include <cmath>
 #include <limits>
 
-#include "filter/ingest/evidence.h"
-#include "filter/ingest/silence.h"
+#include "filter/ingest/limits.h"
 #include "filter/ingest/stream_clock.h"
 
 namespace ear {
 namespace {
 
 constexpr double kHeldUp = 10.0;  // [s] chosen: no driver is held up so long; measured: 6 s
-
-TimeNs nanoseconds(double seconds) { return static_cast<TimeNs>(std::llround(1e9 * seconds)); }
 
 }  // namespace
 
@@ -53,10 +50,10 @@ void EvenClock::compare(const WheelIncrement& increment, double intervals) {
 /// No reading is taken after it arrived, and within a while one is not held up.
 void EvenClock::follow(const WheelIncrement& increment, double intervals) {
   const TimeNs stamp_ns = increment.to_ns, before_ns = even_ns_;
-  even_ns_ = std::min(stamp_ns, even_ns_ + nanoseconds(intervals * interval_));
+  even_ns_ = std::min(stamp_ns, later_by(intervals * interval_, even_ns_));
   least_late_ = std::min(least_late_, seconds_between(even_ns_, stamp_ns));
   if (seconds_between(window_ns_, stamp_ns) > kHeldUp) {
-    even_ns_ += nanoseconds(least_late_);
+    even_ns_ = later_by(least_late_, even_ns_);
     window_ns_ = stamp_ns;
     least_late_ = std::numeric_limits<double>::infinity();
   }

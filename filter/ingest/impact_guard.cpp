@@ -3,8 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "filter/ingest/evidence.h"
-#include "filter/ingest/silence.h"
+#include "filter/ingest/limits.h"
 
 namespace ear {
 namespace {
@@ -62,14 +61,13 @@ bool ExcessWatch::clipped(const Eigen::Vector3d& value) {
 ImpactGuard::ImpactGuard(const ImpactConfig& config, const ImuCalibration& imu)
     : gyro_(config.gyro_range, config.gyro_deviation, config.gyro_deviation / kTurnRate, 1.0),
       accel_(config.accel_range, config.accel_deviation, kStreamGap, kAccelShare),
-      gyro_sigma_(imu.gyro_noise * std::sqrt(imu.rate_hz)),
-      accel_sigma_(imu.accel_noise * std::sqrt(imu.rate_hz)) {}
+      sigma_(imu) {}
 
 ImuNoiseFactors ImpactGuard::add(const ImuSample& sample) {
   const double dt = last_ns_ ? seconds_between(*last_ns_, sample.t_ns) : 0.0;
   last_ns_ = sample.t_ns;
-  return {std::hypot(1.0, gyro_.add(sample.gyro_B, dt) / gyro_sigma_),
-          std::hypot(1.0, accel_.add(sample.accel_B, dt) / accel_sigma_)};
+  return {std::hypot(1.0, gyro_.add(sample.gyro_B, dt) / sigma_.gyro),
+          std::hypot(1.0, accel_.add(sample.accel_B, dt) / sigma_.accel)};
 }
 
 }  // namespace ear

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cmath>
 #include <optional>
 
 #include "ear/calibration.h"
@@ -14,6 +15,15 @@ namespace ear {
 
 /// [rad/s^2] chosen: no body turns more suddenly; a multirotor of 1.5 kg, 15 N on one side at 0.15 m.
 inline constexpr double kTurnRate = 100.0;
+
+/// Standard deviations of a sample's white noise.
+struct SampleSigma {
+  explicit SampleSigma(const ImuCalibration& imu)
+      : gyro(imu.gyro_noise * std::sqrt(imu.rate_hz)), accel(imu.accel_noise * std::sqrt(imu.rate_hz)) {}
+
+  double gyro;   ///< [rad/s]
+  double accel;  ///< [m/s^2]
+};
 
 /// Watches one sensor of three axes.
 class ExcessWatch {
@@ -53,7 +63,7 @@ class ImpactGuard {
 
  private:
   ExcessWatch gyro_, accel_;
-  double gyro_sigma_, accel_sigma_;  ///< of a sample's white noise [rad/s], [m/s^2]
+  SampleSigma sigma_;
   std::optional<TimeNs> last_ns_;
 };
 

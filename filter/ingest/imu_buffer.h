@@ -47,7 +47,6 @@ class ImuBuffer {
   explicit ImuBuffer(std::size_t capacity) : entries_(capacity) {}
 
   void push(const ImuSample& sample, const ImuNoiseFactors& noise = {});
-  void clear() { entries_.clear(); }
   /// The sample that so many came after, to correct it: its stamp stays.
   [[nodiscard]] Entry& entry(std::size_t age) { return entries_[size() - 1 - age]; }
 

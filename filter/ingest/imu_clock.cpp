@@ -3,9 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "filter/ingest/capacity.h"
-#include "filter/ingest/silence.h"
-#include "filter/ingest/stamp_guard.h"
+#include "filter/ingest/limits.h"
 #include "filter/ingest/stream_clock.h"
 
 namespace ear {
@@ -38,7 +36,7 @@ void ImuClock::follow(TimeNs driver_ns) {
   }
   last_ns_ = driver_ns;
   for (Other& other : others_) other.before_ns = other.newest_ns;
-  if (corrected_ns_ && seconds_between(*corrected_ns_, driver_ns) > kLostAfter) corrected_ns_.reset();
+  if (uncertain_ && seconds_between(uncertain_->t_ns, driver_ns) > kLostAfter) uncertain_.reset();
 }
 
 void ImuClock::add(const ImuSample& sample) {
@@ -90,10 +88,10 @@ void ImuClock::settle(bool own_clock) {
   waiting_ = false;
   const TimeNs newest_ns = newest_waiting();
   if (own_clock) {
-    shift_ns_ += std::llround(1e9 * jump_);
-    corrected_ns_ = newest_ns;
-    contradictions_ = 0;
+    shift_ns_ = later_by(jump_, shift_ns_);
+    uncertain_ = Correction{newest_ns, jump_};
     ++corrected_;
+    new_correction_ = true;
   }
   follow(newest_ns);
 }
@@ -102,16 +100,16 @@ void ImuClock::settle(bool own_clock) {
 /// undone.
 void ImuClock::review(Other& other, TimeNs stamp_ns) {
   const double ahead = seconds_between(*last_ns_ - shift_ns_, stamp_ns);
-  if (!corrected_ns_) {
+  if (!uncertain_) {
     const double passed = other.newest_ns ? seconds_between(*other.newest_ns, stamp_ns) : kClockMemory;
     other.ahead += std::clamp(passed / kClockMemory, 0.0, 1.0) * (ahead - other.ahead);
     return;
   }
-  const double jumped = (ahead - other.ahead) / jump_;
-  contradictions_ = is_small_against(1.0, jumped - 1.0) ? contradictions_ + 1 : 0;
-  if (contradictions_ < kContradictions) return;
-  shift_ns_ -= std::llround(1e9 * jump_);
-  corrected_ns_.reset();
+  const double jumped = (ahead - other.ahead) / uncertain_->jump;
+  uncertain_->contradictions = is_small_against(1.0, jumped - 1.0) ? uncertain_->contradictions + 1 : 0;
+  if (uncertain_->contradictions < kContradictions) return;
+  shift_ns_ = later_by(-uncertain_->jump, shift_ns_);
+  uncertain_.reset();
   --corrected_;
 }
 

@@ -6,6 +6,7 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <utility>
 
 #include "ear/types.h"
 #include "filter/ingest/ring.h"
@@ -30,11 +31,8 @@ class ImuClock {
 
   [[nodiscard]] bool waiting() const { return waiting_; }
   /// Was a jump taken out since the last call?
-  [[nodiscard]] bool take_correction() {
-    const bool any = corrected_ != reported_;
-    reported_ = corrected_;
-    return any;
-  }
+  [[nodiscard]] bool take_correction() { return std::exchange(new_correction_, false); }
+  /// Those that were not undone.
   [[nodiscard]] int jumps_corrected() const { return corrected_; }
 
  private:
@@ -43,6 +41,12 @@ class ImuClock {
     std::optional<TimeNs> newest_ns;
     std::optional<TimeNs> before_ns;  ///< the newest when the last inertial sample came that followed the one before
     double ahead = 0.0;               ///< [s] of the inertial samples, usually
+  };
+  /// A jump that was taken out.
+  struct Correction {
+    TimeNs t_ns = 0;
+    double jump = 0.0;       ///< [s]
+    int contradictions = 0;  ///< readings in a row against it
   };
 
   [[nodiscard]] bool jumps(double step) const;
@@ -53,17 +57,16 @@ class ImuClock {
   void review(Other& other, TimeNs stamp_ns);
 
   std::array<Other, 3> others_;
-  Ring<ImuSample> samples_;             ///< not fetched yet, by the driver's clock
-  bool waiting_ = false;                ///< for a verdict
-  double jump_ = 0.0;                   ///< [s] what it is about
-  int votes_ = 0;                       ///< readings for a jump of the inertial clock, less those against
-  TimeNs shift_ns_ = 0;                 ///< driver's clock less the common one
-  std::optional<TimeNs> last_ns_;       ///< the newest sample that followed the one before, by the driver's clock
-  double interval_ = 0.0;               ///< [s] usual
-  std::optional<TimeNs> corrected_ns_;  ///< when a jump was last taken out; until that is certain
-  int contradictions_ = 0;              ///< readings in a row against it
+  Ring<ImuSample> samples_;              ///< not fetched yet, by the driver's clock
+  bool waiting_ = false;                 ///< for a verdict
+  double jump_ = 0.0;                    ///< [s] what it is about
+  int votes_ = 0;                        ///< readings for a jump of the inertial clock, less those against
+  TimeNs shift_ns_ = 0;                  ///< driver's clock less the common one
+  std::optional<TimeNs> last_ns_;        ///< the newest sample that followed the one before, by the driver's clock
+  double interval_ = 0.0;                ///< [s] usual
+  std::optional<Correction> uncertain_;  ///< the last one, until it is certain
   int corrected_ = 0;
-  int reported_ = 0;  ///< of these
+  bool new_correction_ = false;  ///< since take_correction()
 };
 
 }  // namespace ear

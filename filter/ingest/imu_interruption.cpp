@@ -1,8 +1,9 @@
 #include "filter/ingest/imu_interruption.h"
 
+#include <algorithm>
 #include <cmath>
 
-#include "filter/ingest/silence.h"
+#include "filter/ingest/limits.h"
 
 namespace ear {
 namespace {
@@ -11,7 +12,13 @@ constexpr double kSettles = 0.07;  // [s] chosen: two frames at 30 Hz after a br
 
 }  // namespace
 
-void ImuInterruption::add_gap(TimeNs from_ns, TimeNs to_ns, double unseen) { gap_ = Gap{from_ns, to_ns, unseen}; }
+/// A gap that the state has not passed yet grows by the next one.
+void ImuInterruption::add_gap(TimeNs from_ns, TimeNs to_ns, double unseen) {
+  if (!gap_) gap_ = Gap{from_ns};
+  gap_->to_ns = to_ns;
+  gap_->counted *= gap_->unseen / (gap_->unseen + unseen);
+  gap_->unseen += unseen;
+}
 
 void ImuInterruption::add_uncertain(TimeNs t_ns) {
   if (!uncertain_since_ns_) uncertain_since_ns_ = t_ns;
@@ -21,7 +28,8 @@ void ImuInterruption::add_uncertain(TimeNs t_ns) {
 double ImuInterruption::take_unseen(TimeNs t_ns) {
   if (!gap_ || t_ns <= gap_->from_ns) return 0.0;
   const bool over = t_ns >= gap_->to_ns;
-  const double share = over ? 1.0 : seconds_between(gap_->from_ns, t_ns) / seconds_between(gap_->from_ns, gap_->to_ns);
+  const double passed = seconds_between(gap_->from_ns, t_ns) / seconds_between(gap_->from_ns, gap_->to_ns);
+  const double share = over ? 1.0 : std::max(passed, gap_->counted);  // counted before the gap grew longer
   const double unseen = gap_->unseen * std::sqrt(share * share - gap_->counted * gap_->counted);
   gap_->counted = share;
   if (over) gap_.reset();

@@ -3,9 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "filter/ingest/evidence.h"
 #include "filter/ingest/impact_guard.h"
-#include "filter/ingest/silence.h"
+#include "filter/ingest/limits.h"
 
 namespace ear {
 namespace {
@@ -81,9 +80,8 @@ void ImuSpikes::give_up(ImuBuffer& samples) {
 }
 
 ImuSpikes::ImuSpikes(const ImpactConfig& config, const ImuCalibration& imu)
-    : gyro_(&ImuSample::gyro_B, &ImuNoiseFactors::gyro, imu.gyro_noise * std::sqrt(imu.rate_hz), 0.0, kTurnRate, false),
-      accel_(&ImuSample::accel_B, &ImuNoiseFactors::accel, imu.accel_noise * std::sqrt(imu.rate_hz),
-             config.accel_deviation, 0.0, true) {}
+    : gyro_(&ImuSample::gyro_B, &ImuNoiseFactors::gyro, SampleSigma(imu).gyro, 0.0, kTurnRate, false),
+      accel_(&ImuSample::accel_B, &ImuNoiseFactors::accel, SampleSigma(imu).accel, config.accel_deviation, 0.0, true) {}
 
 ImuFault ImuSpikes::add(ImuBuffer& samples, double dt, bool accel_clips) {
   const std::size_t accel_length = accel_.length();

@@ -3,23 +3,18 @@
 #include <cmath>
 #include <utility>
 
-#include "filter/ingest/capacity.h"
-#include "filter/ingest/silence.h"
+#include "filter/ingest/limits.h"
 
 namespace ear {
 namespace {
 
-TimeNs begin_of(const WheelIncrement& increment) { return increment.from_ns; }
-TimeNs begin_of(const BeamRanges& ranges) { return ranges.t_ns; }
-TimeNs end_of(const WheelIncrement& increment) { return increment.to_ns; }
-TimeNs end_of(const BeamRanges& ranges) { return ranges.t_ns; }
-
-/// Ingest::due_before. Without a state what is too old for a start is forgotten.
+/// Ingest::push of a reading from `begin` to `end`. Without a state what is too old for a start is forgotten.
 template <typename T>
-std::optional<TimeNs> make_room(Ring<T>& readings, const T& next, bool has_state) {
-  if (has_state) return readings.full() ? std::optional(end_of(readings.front())) : std::nullopt;
-  const auto too_old = [&] { return seconds_between(begin_of(readings.front()), end_of(next)) > kLostAfter; };
-  while (!readings.empty() && (readings.full() || too_old())) readings.pop();
+std::optional<TimeNs> append(Ring<T>& readings, const T& next, TimeNs T::*begin, TimeNs T::*end, bool has_state) {
+  readings.push(next);
+  if (has_state) return readings.full() ? std::optional(readings.front().*end) : std::nullopt;
+  const auto too_old = [&] { return seconds_between(readings.front().*begin, next.*end) > kLostAfter; };
+  while (readings.size() > 1 && (readings.full() || too_old())) readings.pop();
   return std::nullopt;
 }
 
@@ -48,9 +43,10 @@ void Ingest::restart() {
   *this = std::move(fresh);
 }
 
-ImuVerdict Ingest::judge(const ImuSample& sample) {
+ImuVerdict Ingest::judge(const ImuSample& sample, bool has_state) {
   const ImuVerdict verdict = guard_.judge(sample);
   if (verdict.accepted && !verdict.begins_anew && !imu_.empty() && verdict.unseen > config_.max_imu_gap) {
+    if (!has_state) interruption_ = ImuInterruption{};
     interruption_.add_gap(imu_.newest().t_ns, sample.t_ns, verdict.unseen);
   }
   return verdict;
@@ -84,12 +80,12 @@ std::optional<TimeNs> Ingest::imu_due() const {
   return imu_.size() == kCapacity ? std::optional(imu_[kCapacity / 2].t_ns) : std::nullopt;
 }
 
-std::optional<TimeNs> Ingest::due_before(const WheelIncrement& increment, bool has_state) {
-  return make_room(increments_, increment, has_state);
+std::optional<TimeNs> Ingest::push(const WheelIncrement& increment, bool has_state) {
+  return append(increments_, increment, &WheelIncrement::from_ns, &WheelIncrement::to_ns, has_state);
 }
 
-std::optional<TimeNs> Ingest::due_before(const BeamRanges& ranges, bool has_state) {
-  return make_room(ranges_, ranges, has_state);
+std::optional<TimeNs> Ingest::push(const BeamRanges& ranges, bool has_state) {
+  return append(ranges_, ranges, &BeamRanges::t_ns, &BeamRanges::t_ns, has_state);
 }
 
 std::optional<Measurement> Ingest::next(TimeNs t_ns) {

@@ -36,7 +36,8 @@ class Ingest {
   /// Inertial samples go in here as their drivers stamped them, and stamps of the other streams as they come; what
   /// comes out goes to judge() and store().
   [[nodiscard]] ImuClock& imu_clock() { return imu_clock_; }
-  [[nodiscard]] ImuVerdict judge(const ImuSample& sample);
+  /// `has_state`: one that has to pass the gaps; else the last of them counts alone.
+  [[nodiscard]] ImuVerdict judge(const ImuSample& sample, bool has_state);
   /// Into the buffer. What only a fault of a sensor does: a spike (of the samples before), a clipped value.
   ImuFault store(const ImuSample& sample);
 
@@ -58,12 +59,10 @@ class Ingest {
 
   /// If the buffer of inertial samples is full: the time up to which the state has to go before the next one.
   [[nodiscard]] std::optional<TimeNs> imu_due() const;
-  /// Readings wait here until the state passes them. If the queue is full: the time up to which the state has to go
-  /// first. Without a state, the oldest make room.
-  [[nodiscard]] std::optional<TimeNs> due_before(const WheelIncrement& increment, bool has_state);
-  [[nodiscard]] std::optional<TimeNs> due_before(const BeamRanges& ranges, bool has_state);
-  void push(const WheelIncrement& increment) { increments_.push(increment); }
-  void push(const BeamRanges& ranges) { ranges_.push(ranges); }
+  /// Readings wait here until the state passes them. If the queue is full now: the time up to which the state has to go
+  /// before the next one. Without a state, the oldest make room.
+  [[nodiscard]] std::optional<TimeNs> push(const WheelIncrement& increment, bool has_state);
+  [[nodiscard]] std::optional<TimeNs> push(const BeamRanges& ranges, bool has_state);
   /// The next one that is not later than `t_ns`, in time order.
   [[nodiscard]] std::optional<Measurement> next(TimeNs t_ns);
   /// All that are earlier.

@@ -4,8 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "filter/ingest/capacity.h"
-#include "filter/ingest/silence.h"
+#include "filter/ingest/limits.h"
 #include "filter/ingest/stream_clock.h"
 
 namespace ear {

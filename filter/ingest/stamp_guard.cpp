@@ -1,6 +1,6 @@
 #include "filter/ingest/stamp_guard.h"
 
-#include "filter/ingest/silence.h"
+#include "filter/ingest/limits.h"
 
 namespace ear {
 namespace {
@@ -26,7 +26,7 @@ Stamp StampGuard::judge(TimeNs t_ns) {
   clock_shift_ = ahead ? 0 : run_from_ns_ - *last_ns_;
   last_ns_ = t_ns;
   run_ = 0;
-  return ahead ? Stamp::after_gap : Stamp::set_back;
+  return ahead ? Stamp::next : Stamp::set_back;
 }
 
 }  // namespace ear

@@ -8,11 +8,8 @@
 
 namespace ear {
 
-[[nodiscard]] constexpr bool is_time(TimeNs t_ns) { return t_ns > -kLargestStamp && t_ns < kLargestStamp; }
-
 enum class Stamp : std::uint8_t {
-  next,       ///< follows the one before
-  after_gap,  ///< the stream returns: a step ahead that further stamps have confirmed
+  next,       ///< follows the one before, or a step ahead that further stamps have confirmed
   set_back,   ///< the clock was set back: stamps have gone on from an earlier time for a second
   not_later,  ///< refused: a duplicate, or earlier
   far_ahead   ///< refused: a step ahead that nothing confirms yet

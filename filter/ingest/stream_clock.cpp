@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "filter/ingest/stamp_guard.h"
-
 namespace ear {
 
 /// By how much a stamp is ahead of where readings that come at that time should be; 0 if that is no jump [s]. After a
@@ -47,6 +45,7 @@ std::optional<TimeNs> StreamClock::correct(TimeNs stamp_ns, std::optional<TimeNs
   if (now_ns && shift_was_wrong(stamp_ns, *now_ns)) {
     shift_ns_ = 0;
     contradictions_ = 0;
+    --jumps_;
     last_ns_.reset();
   }
   TimeNs t_ns = stamp_ns - shift_ns_;
@@ -56,9 +55,8 @@ std::optional<TimeNs> StreamClock::correct(TimeNs stamp_ns, std::optional<TimeNs
       const bool follows = suspect_ns_ && std::abs(seconds_between(*suspect_ns_, t_ns) - interval_) < kClockJump;
       suspect_ns_ = t_ns;
       if (!follows) return std::nullopt;
-      const auto jump_ns = static_cast<TimeNs>(std::llround(1e9 * jump));
-      shift_ns_ += jump_ns;
-      t_ns -= jump_ns;
+      shift_ns_ = later_by(jump, shift_ns_);
+      t_ns = later_by(-jump, t_ns);
       ++jumps_;
     }
   }

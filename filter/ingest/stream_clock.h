@@ -8,8 +8,7 @@
 #include <optional>
 
 #include "ear/types.h"
-#include "filter/ingest/evidence.h"
-#include "filter/ingest/silence.h"
+#include "filter/ingest/limits.h"
 
 namespace ear {
 
@@ -33,6 +32,7 @@ class StreamClock {
   /// of its own.
   [[nodiscard]] std::optional<TimeNs> correct(TimeNs stamp_ns, std::optional<TimeNs> now_ns, double tick = 0.0);
 
+  /// Taken out, and not put back.
   [[nodiscard]] int jumps() const { return jumps_; }
 
  private:

@@ -8,8 +8,8 @@
 
 #include "ear/calibration.h"
 #include "ear/types.h"
+#include "filter/ingest/limits.h"
 #include "filter/ingest/ring.h"
-#include "filter/ingest/silence.h"
 
 namespace ear {
 

@@ -8,13 +8,6 @@ FilterKernels filter_kernels_sse2();
 FilterKernels filter_kernels_sse4();
 FilterKernels filter_kernels_avx2();
 
-std::vector<FilterKernels> all_filter_kernels() {
-  std::vector<FilterKernels> all{filter_kernels_sse2()};
-  if (__builtin_cpu_supports("sse4.1")) all.push_back(filter_kernels_sse4());
-  if (__builtin_cpu_supports("avx2")) all.push_back(filter_kernels_avx2());
-  return all;
-}
-
 FilterKernels filter_kernels(Kernels kind) {
   const bool best = kind == Kernels::best || kind == Kernels::avx2;
   if (best && __builtin_cpu_supports("avx2")) return filter_kernels_avx2();
@@ -25,8 +18,6 @@ FilterKernels filter_kernels(Kernels kind) {
 #else
 
 FilterKernels filter_kernels_baseline();
-
-std::vector<FilterKernels> all_filter_kernels() { return {filter_kernels_baseline()}; }
 
 FilterKernels filter_kernels(Kernels) { return filter_kernels_baseline(); }
 

@@ -7,7 +7,6 @@
 #pragma once
 
 #include <cstddef>
-#include <vector>
 
 #include "ear/kernels.h"
 
@@ -79,9 +78,6 @@ struct FilterKernels {
   /// Adds the features to the sums of both cameras of frame 1; how many fit.
   int (*add_stereo)(const StereoTable& table, const StereoProblem& problem, StereoSums* sums);
 };
-
-/// Those that this build has and this processor can run, the best one last.
-[[nodiscard]] std::vector<FilterKernels> all_filter_kernels();
 
 /// Where this processor, or this build, does not have them: the next best.
 [[nodiscard]] FilterKernels filter_kernels(Kernels kind = Kernels::best);

@@ -4,8 +4,7 @@
 #include <cmath>
 
 #include "filter/ekf/so3.h"
-#include "filter/ingest/evidence.h"
-#include "filter/ingest/silence.h"
+#include "filter/ingest/limits.h"
 
 namespace ear {
 namespace {
@@ -35,7 +34,7 @@ std::optional<Innovation> ImuScore::add_excess(const ExcessTurn& turn, const Imu
   const double since = e.last_ns ? seconds_between(*e.last_ns, t_ns) : kStale;
   const auto variance = [&P](int entry) { return std::max(0.0, P.matrix()(entry, entry)); };
   const double mounting = P.matrix().diagonal().segment<3>(err::camera).cwiseMax(0.0).maxCoeff();
-  const Eigen::Vector3d rate_B = log_so3(motion.R_BiBj) / dt;
+  const Eigen::Vector3d rate_B = log_so3(motion.T_BiBj.R) / dt;
   const Eigen::Vector3d change = since < kStale ? Eigen::Vector3d((rate_B - e.rate_B) / dt) : Eigen::Vector3d::Zero();
   const double kept = std::exp(-std::max(0.0, since) / kStale);
   e.count = kept * e.count + 1.0;
@@ -43,16 +42,14 @@ std::optional<Innovation> ImuScore::add_excess(const ExcessTurn& turn, const Imu
                change.squaredNorm() * variance(err::time_offset);
   e.rate_B = rate_B;
   e.last_ns = t_ns;
-  const double noise = motion.turn_variance * std::pow(at_rest_.gyro / gyro_.weight(), 2);
+  const double noise = motion.turn_variance * std::pow(learned().gyro, 2);
   Innovation worst;
   for (int axis = 0; axis < 3; ++axis) {
     e.rate(axis) = kept * e.rate(axis) + turn.value(axis) / dt;
     e.variance(axis) = kept * kept * e.variance(axis) + (turn.covariance(axis, axis) + noise) / (dt * dt);
-    Innovation mean;
-    mean.value = e.rate(axis) / e.count;
-    mean.variance = e.variance(axis) / (e.count * e.count) + e.apparent / e.count + variance(err::b_g + axis);
-    mean.gate = kClear * kClear;
-    mean.fits = mean.value * mean.value <= mean.gate * mean.variance;
+    const double mean_variance =
+        e.variance(axis) / (e.count * e.count) + e.apparent / e.count + variance(err::b_g + axis);
+    const Innovation mean = Innovation::of(e.rate(axis) / e.count, mean_variance, kClear * kClear);
     if (axis == 0 || mean.value * mean.value * worst.variance > worst.value * worst.value * mean.variance) worst = mean;
   }
   return worst;
@@ -64,14 +61,14 @@ std::optional<Innovation> ImuScore::add(const ImuMotion& motion, const StereoMot
   StereoMotion seen = images;
   seen.covariance *= kCommon;
   const Eigen::Matrix3d by_state = motion.by_state(P);
-  const Eigen::Vector3d shift = seen.p_B0B1 - motion.p_BiBj;
+  const Eigen::Vector3d shift = seen.T_B0B1.p - motion.T_BiBj.p;
   const Eigen::Matrix3d shift_variance = by_state + seen.p_covariance();
   for (int axis = 0; axis < 3; ++axis) {
     const double noise = motion.covariance(axis, axis) * at_rest_.accel * at_rest_.accel;
     accel_.add(shift(axis), {shift_variance(axis, axis), noise}, t_ns);
   }
-  const Eigen::Matrix3d believed = by_state + motion.covariance * std::pow(at_rest_.accel / accel_.weight(), 2);
-  const ExcessTurn turn = turn_beyond(seen, motion.R_BiBj, motion.p_BiBj, believed);
+  const Eigen::Matrix3d believed = by_state + motion.covariance * std::pow(learned().accel, 2);
+  const ExcessTurn turn = turn_beyond(seen, motion.T_BiBj, believed);
   const std::optional<Innovation> excess = add_excess(turn, motion, P, t_ns);
   for (int axis = 0; axis < 3; ++axis) {
     const double bias = P.matrix()(err::b_g + axis, err::b_g + axis) * motion.duration * motion.duration;
@@ -81,9 +78,6 @@ std::optional<Innovation> ImuScore::add(const ImuMotion& motion, const StereoMot
   return excess;
 }
 
-ImuNoiseFactors ImuScore::noise() const {
-  if (!adapts_) return {};
-  return {at_rest_.gyro / gyro_.weight(), at_rest_.accel / accel_.weight()};
-}
+ImuNoiseFactors ImuScore::noise() const { return adapts_ ? learned() : ImuNoiseFactors{}; }
 
 }  // namespace ear

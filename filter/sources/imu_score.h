@@ -31,6 +31,10 @@ class ImuScore {
   [[nodiscard]] ImuNoiseFactors noise() const;
 
  private:
+  [[nodiscard]] ImuNoiseFactors learned() const {
+    return {at_rest_.gyro / gyro_.weight(), at_rest_.accel / accel_.weight()};
+  }
+
   /// Means over the last moments, which forget in kStale.
   struct Excess {
     double count = 0.0;

@@ -4,7 +4,7 @@
 
 #include "filter/ekf/imu_displacement.h"
 #include "filter/ekf/initial_state.h"
-#include "filter/ingest/silence.h"
+#include "filter/ingest/limits.h"
 
 namespace ear {
 namespace {
@@ -23,9 +23,8 @@ Sources::Sources(const FilterConfig& config, const Calibration& calibration)
       ground_(config, calibration),
       cameras_(config, calibration),
       standstill_(config.standstill, focal_length(calibration), config.window) {
-  if (!calibration.encoder || config.odometer.model == OdometerModel::none) return;
-  const bool sees_ground = calibration.lasers && !calibration.lasers->beams.empty();
-  wheels_.emplace(config.odometer, calibration, sees_ground);
+  if (!ear::uses_wheels(config, calibration)) return;
+  wheels_.emplace(config.odometer, calibration, has_beams(calibration));
   normal_walk_ = config.odometer.normal_walk;
 }
 
@@ -39,9 +38,10 @@ void Sources::look_at(const FeatureFrame& frame, TimeNs t_ns, const Ingest& inge
   cameras_.measure_noise(frame, ekf.state().camera);
   const FeatureFrame nothing{frame.t_ns, {}};
   const bool repeated = frame.repeated && ekf.running();  // a frozen image shows no standing
-  standstill_.update({repeated ? nothing : frame, t_ns, ingest.imu(),
+  const ImuStatistics recent = standstill_.recent(ingest.imu(), t_ns);
+  standstill_.update({repeated ? nothing : frame, t_ns, recent,
                       ekf.running() ? std::optional(ekf.state().imu.b_g) : std::nullopt, on_ground()});
-  if (standstill_.stands()) imu_score_.add_rest(standstill_.recent(ingest.imu(), t_ns), imu_);
+  if (standstill_.stands()) imu_score_.add_rest(recent, imu_);
   ground_.set_gyro_bias(ekf.state().imu.b_g);
   if (stood && !standstill_.stands() && ekf.running()) ekf.inflate_biases(kShakenGyro, kShakenAccel);
 }
@@ -51,7 +51,7 @@ Displacements Sources::displacements(const FeatureFrame& frame, TimeNs t_ns, con
   motion_ = imu_motion(ekf.state().imu, ingest.imu(), t_ns, imu_);
   Displacements result;
   result[index_of(MotionSensor::imu)] = imu_displacement(motion_, ekf.covariance());
-  if (wheels_ && on_ground() && ground_.rolls_at(ekf.state().imu.t_ns)) {
+  if (on_ground() && ground_.rolls_at(ekf.state().imu.t_ns)) {
     result[index_of(MotionSensor::odometer)] =
         wheels_->displacement(ekf, ingest.increments(), ingest.imu(), t_ns, ground_known);
   }
@@ -120,26 +120,20 @@ FrameAgreement Sources::check(const FeatureFrame& frame, Ingest& ingest, Ekf& ek
   return seen;
 }
 
-void Sources::use_image(const FeatureFrame& frame, bool stands, const Advice& advice, Ekf& ekf, Records& records) {
-  if (stands && standstill_.clone_is_here()) {
+/// A vehicle that moves on without an image leaves no clone.
+void Sources::update(const FeatureFrame* image, bool stands, const Advice& advice, Ekf& ekf, Records& records) {
+  const bool holds = stands && clone_is_here_;
+  clone_is_here_ = image != nullptr || stands;
+  if (holds) {
     hold(ekf, records);
-  } else {
+  } else if (clone_is_here_) {
     camera_update_ = advice.cameras_sound ? CameraUpdate::learned : CameraUpdate::considered;
-    standstill_.set_clone_here(true);
-    cameras_.update(frame, advice.of(MotionSensor::camera), camera_update_, ekf, records);
-  }
-  records.statistics.clones = static_cast<int>(ekf.state().clones.size());
-}
-
-void Sources::go_without_image(const Advice& advice, Ekf& ekf, Records& records) {
-  if (standstill_.stands() && standstill_.clone_is_here()) {
-    hold(ekf, records);
-  } else if (standstill_.stands()) {
-    camera_update_ = advice.cameras_sound ? CameraUpdate::learned : CameraUpdate::considered;
-    standstill_.set_clone_here(true);
-    cameras_.clone_without_image(advice.of(MotionSensor::camera), ekf);
-  } else {
-    standstill_.set_clone_here(false);
+    const double weight = advice.of(MotionSensor::camera);
+    if (image != nullptr) {
+      cameras_.update(*image, weight, camera_update_, ekf, records);
+    } else {
+      cameras_.clone_without_image(weight, ekf);
+    }
   }
   records.statistics.clones = static_cast<int>(ekf.state().clones.size());
 }
@@ -155,7 +149,7 @@ void Sources::reset() {
   if (wheels_) wheels_->reset();
   ground_.reset();
   cameras_.reset();
-  standstill_.set_clone_here(false);
+  clone_is_here_ = false;
 }
 
 }  // namespace ear

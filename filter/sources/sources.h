@@ -46,10 +46,8 @@ class Sources {
   void propagate(TimeNs t_ns, const Advice& advice, Ingest& ingest, Ekf& ekf) const;
   /// With the state, if there is one, at the frame's time: does the frame show the motion that the others predict?
   [[nodiscard]] FrameAgreement check(const FeatureFrame& frame, Ingest& ingest, Ekf& ekf);
-  /// The frame updates the state. `stands`: the vehicle does, and is held where it is.
-  void use_image(const FeatureFrame& frame, bool stands, const Advice& advice, Ekf& ekf, Records& records);
-  /// The same at a frame's time, without the image.
-  void go_without_image(const Advice& advice, Ekf& ekf, Records& records);
+  /// At a frame's time, with its features or without. `stands`: the vehicle does, and is held where it is.
+  void update(const FeatureFrame* image, bool stands, const Advice& advice, Ekf& ekf, Records& records);
 
   /// The state begins anew. What was seen of contact and standing stays.
   void reset();
@@ -76,6 +74,7 @@ class Sources {
   Ground ground_;
   Cameras cameras_;
   Standstill standstill_;
+  bool clone_is_here_ = false;  ///< the newest clone was made where the vehicle stands
   /// Standing and bridges show nothing of the cameras' calibration, images that are sound do.
   CameraUpdate camera_update_ = CameraUpdate::considered;
 };

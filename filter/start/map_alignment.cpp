@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "filter/ekf/propagation.h"
-
 namespace ear {
 namespace {
 
@@ -34,20 +32,18 @@ NavState MapAlignment::to_world(const NavState& state_A) const {
 }
 
 /// A yaw error e of the alignment turns the vehicle, its velocity, and its path since the start, about z.
-Eigen::Matrix<double, estimate_error::size, estimate_error::size> MapAlignment::to_world(
-    const Eigen::Matrix<double, estimate_error::size, estimate_error::size>& covariance_A,
-    const NavState& state_A) const {
+ImuErrorMatrix MapAlignment::to_world(const ImuErrorMatrix& covariance_A, const NavState& state_A) const {
   namespace at = estimate_error;
   const bool same = q_WA.vec().isZero(0.0) && yaw_sigma == 0.0 && position_sigma == 0.0;
   if (same) return covariance_A;
   const Eigen::Matrix3d R = q_WA.toRotationMatrix();
-  Eigen::Matrix<double, at::size, at::size> T = Eigen::Matrix<double, at::size, at::size>::Identity();
+  ImuErrorMatrix T = ImuErrorMatrix::Identity();
   for (const int block : {at::rotation, at::velocity, at::position}) T.block<3, 3>(block, block) = R;
   Eigen::Matrix<double, at::size, 1> by_yaw = Eigen::Matrix<double, at::size, 1>::Zero();
   by_yaw.segment<3>(at::rotation) = Eigen::Vector3d::UnitZ();
   by_yaw.segment<3>(at::velocity) = Eigen::Vector3d::UnitZ().cross(R * state_A.v_W);
   by_yaw.segment<3>(at::position) = Eigen::Vector3d::UnitZ().cross(R * (state_A.p_WB - start_A));
-  Eigen::Matrix<double, at::size, at::size> P = T * covariance_A * T.transpose();
+  ImuErrorMatrix P = T * covariance_A * T.transpose();
   P += yaw_sigma * yaw_sigma * by_yaw * by_yaw.transpose();
   P.diagonal().segment<3>(at::position).array() += position_sigma * position_sigma;
   return P;

@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 
 #include "ear/estimate.h"
+#include "filter/ekf/propagation.h"
 #include "filter/ekf/state.h"
 #include "filter/ingest/imu_buffer.h"
 
@@ -23,9 +24,7 @@ struct MapAlignment {
 
   [[nodiscard]] NavState to_world(const NavState& state_A) const;
   /// The covariance in W: turned, and with what is not known of the alignment itself. `state_A`: that of the estimate.
-  [[nodiscard]] Eigen::Matrix<double, estimate_error::size, estimate_error::size> to_world(
-      const Eigen::Matrix<double, estimate_error::size, estimate_error::size>& covariance_A,
-      const NavState& state_A) const;
+  [[nodiscard]] ImuErrorMatrix to_world(const ImuErrorMatrix& covariance_A, const NavState& state_A) const;
 };
 
 /// After a start that is not the first: the vehicle is where it was last known to be (`last`), less and less certainly;

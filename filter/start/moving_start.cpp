@@ -5,7 +5,7 @@
 
 #include "filter/ekf/propagation.h"
 #include "filter/ekf/so3.h"
-#include "filter/ingest/silence.h"
+#include "filter/ingest/limits.h"
 #include "filter/start/start_fit.h"
 
 namespace ear {
@@ -52,10 +52,9 @@ void MovingStart::add(TimeNs t_ns, const FeatureFrame& frame, const ImuBuffer& i
   if (!first) {
     const TimedFrame& last = frames_.back();
     const std::vector<StereoMatch>& matches = matches_.find(last.features, frame, cameras);
-    StereoMotion start;
-    start.R_B0B1 = gyro_rotation(last.t_ns, t_ns, Eigen::Vector3d::Zero(), imu);
+    const Pose start = {gyro_rotation(last.t_ns, t_ns, Eigen::Vector3d::Zero(), imu),
+                        path_to(t_ns).value_or(Eigen::Vector3d::Zero())};
     const double dt = seconds_between(last.t_ns, t_ns);
-    start.p_B0B1 = path_to(t_ns).value_or(Eigen::Vector3d::Zero());
     const std::optional<StereoMotion> motion = stereo_motion(matches, cameras, start, feature_sigma_);
     if (motion && dt < kStale && !frozen(matches)) {
       next.motion = *motion;
@@ -64,17 +63,14 @@ void MovingStart::add(TimeNs t_ns, const FeatureFrame& frame, const ImuBuffer& i
     }
   }
   frames_.push_back(std::move(next));
-  const auto enough_without_first = [&] {
-    return frames_.size() > kFewestFrames && seconds_between(frames_[1].t_ns, t_ns) >= kStartSpan;
-  };
-  while (enough_without_first()) frames_.erase(frames_.begin());
+  while (spans_enough(1)) frames_.erase(frames_.begin());
 }
 
 std::optional<Eigen::Vector3d> MovingStart::path_to(TimeNs t_ns) const {
   if (frames_.size() < 2) return std::nullopt;
   const TimedFrame& last = frames_.back();
   const double share = seconds_between(last.t_ns, t_ns) / seconds_between(frames_[frames_.size() - 2].t_ns, last.t_ns);
-  return Eigen::Vector3d(share * (last.motion.R_B0B1.transpose() * last.motion.p_B0B1));
+  return Eigen::Vector3d(share * (last.motion.T_B0B1.R.transpose() * last.motion.T_B0B1.p));
 }
 
 /// What turns the gyroscope's rotation into that of the cameras.
@@ -85,14 +81,15 @@ Eigen::Vector3d MovingStart::gyro_bias(const ImuBuffer& imu) const {
     const double dt = seconds_between(frames_[k - 1].t_ns, frames_[k].t_ns);
     const Eigen::Matrix3d R = gyro_rotation(frames_[k - 1].t_ns, frames_[k].t_ns, Eigen::Vector3d::Zero(), imu);
     const double information = dt * dt / (kSeenTurn * kSeenTurn);
-    sum -= information / dt * log_so3(R.transpose() * frames_[k].motion.R_B0B1);
+    sum -= information / dt * log_so3(R.transpose() * frames_[k].motion.T_B0B1.R);
     weight += information;
   }
   return sum / weight;
 }
 
-bool MovingStart::spans_enough() const {
-  return frames_.size() >= kFewestFrames && seconds_between(frames_.front().t_ns, frames_.back().t_ns) >= kStartSpan;
+bool MovingStart::spans_enough(std::size_t first) const {
+  return frames_.size() >= first + kFewestFrames &&
+         seconds_between(frames_[first].t_ns, frames_.back().t_ns) >= kStartSpan;
 }
 
 std::optional<ImuState> MovingStart::solve(const ImuBuffer& imu) const {
@@ -116,8 +113,8 @@ std::optional<ImuState> MovingStart::solve(const ImuBuffer& imu) const {
     H.middleCols<3>(Fit::velocity) = (t1 - t0) * Eigen::Matrix3d::Identity();
     H.middleCols<3>(Fit::gravity) = 0.5 * (t1 * t1 - t0 * t0) * Eigen::Matrix3d::Identity();
     H.middleCols<3>(Fit::accel_bias) = sums.position_by_b_a - before.position_by_b_a;
-    const Eigen::Vector3d z = before.R * motion.p_B0B1 - (sums.position - before.position);
-    const double scale = kScaleSigma * motion.p_B0B1.norm();
+    const Eigen::Vector3d z = before.R * motion.T_B0B1.p - (sums.position - before.position);
+    const double scale = kScaleSigma * motion.T_B0B1.p.norm();
     const double unsteady = kAccelSigma * (t1 - t0) * (t1 - t0);
     const double variance =
         motion.p_covariance().trace() / 3.0 + kPathSigma * kPathSigma + scale * scale + unsteady * unsteady;

@@ -31,8 +31,8 @@ class MovingStart {
   /// The next frame, at IMU time `t_ns`. Where its motion is not known, what came before is forgotten.
   void add(TimeNs t_ns, const FeatureFrame& frame, const ImuBuffer& imu, const CameraState& cameras);
 
-  /// Are the frames kept enough for solve()?
-  [[nodiscard]] bool spans_enough() const;
+  /// Are the frames kept enough for solve(), from this one on?
+  [[nodiscard]] bool spans_enough(std::size_t first = 0) const;
 
   /// A state at the first frame kept; nothing while the frames span too little, or contradict the inertial samples.
   /// Least squares over the velocity v and gravity g of that moment, in the body as it then was (B), and the biases:

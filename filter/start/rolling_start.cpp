@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "filter/ekf/so3.h"
-#include "filter/ingest/silence.h"
+#include "filter/ingest/limits.h"
 #include "filter/start/start_fit.h"
 
 namespace ear {

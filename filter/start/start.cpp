@@ -6,9 +6,8 @@
 #include <string>
 
 #include "filter/ekf/initial_state.h"
-#include "filter/ekf/turn_between.h"
-#include "filter/ingest/stamp_guard.h"
 #include "filter/start/rolling_start.h"
+#include "filter/start/start_fit.h"
 
 namespace ear {
 namespace {
@@ -53,19 +52,18 @@ Start::Start(const FilterConfig& config, const Calibration& calibration)
       calibration_(calibration),
       moving_(config.prior, config.feature_sigma_px / focal_length(calibration)) {}
 
-bool Start::uses_wheels() const { return calibration_.encoder && config_.odometer.model != OdometerModel::none; }
-
 bool Start::scale_is_given() const {
-  const bool lasers = calibration_.lasers && !calibration_.lasers->beams.empty();
-  return uses_wheels() && config_.online_calibration.wheels && !lasers && calibration_.cameras.empty();
+  return uses_wheels(config_, calibration_) && config_.online_calibration.wheels && !has_beams(calibration_) &&
+         calibration_.cameras.empty();
 }
 
-std::optional<StartState> Start::find(const Situation& now, const ImuStatistics& recent, const Ingest& ingest) {
+std::optional<StartState> Start::find(const Situation& now, const Ingest& ingest) {
   if (given_) return as_given(now.t_ns, ingest.imu());
+  if (now.lost) return moving(now, ingest.imu());
   std::optional<StartState> start;
-  Reason lacks = recent.count < 2 ? Reason::few_samples : Reason::moves_unseen;
-  if (now.stands && recent.count >= 2) {
-    start = standing(now.t_ns, recent);
+  Reason lacks = now.recent.count < 2 ? Reason::few_samples : Reason::moves_unseen;
+  if (now.stands && now.recent.count >= 2) {
+    start = standing(now.t_ns, now.recent);
     lacks = Reason::other_gravity;
   }
   if (!start && now.rolls) {
@@ -79,7 +77,7 @@ std::optional<StartState> Start::find(const Situation& now, const ImuStatistics&
     }
   }
   if (start) return start;
-  start = find_in_motion(now, ingest, true);
+  start = moving(now, ingest.imu());
   // A first start can wait for the vehicle to stand, which shows gravity and biases better, or to move.
   const bool waits = start && !now.restarts && start->x.v_W.norm() < kLeastStartSpeed;
   if (waits) waits_for_ = Reason::slow;
@@ -87,13 +85,13 @@ std::optional<StartState> Start::find(const Situation& now, const ImuStatistics&
   return waits ? std::nullopt : start;
 }
 
-std::optional<StartState> Start::find_in_motion(const Situation& now, const Ingest& ingest, bool contradicted) {
-  if (given_) return as_given(now.t_ns, ingest.imu());
+std::optional<StartState> Start::moving(const Situation& now, const ImuBuffer& imu) {
   waits_for_ = calibration_.cameras.size() < 2 ? Reason::moves_unseen : Reason::few_frames;
   if (calibration_.cameras.size() < 2 || now.frame.features.empty()) return std::nullopt;
-  moving_.add(now.t_ns, now.frame, ingest.imu(), now.cameras);
+  moving_.add(now.t_ns, now.frame, imu, camera_state(calibration_));
   if (moving_.spans_enough()) waits_for_ = Reason::cameras_contradict;
-  const std::optional<ImuState> x = contradicted ? moving_.solve(ingest.imu()) : std::nullopt;
+  if (now.lost && !now.contradicted) return std::nullopt;
+  const std::optional<ImuState> x = moving_.solve(imu);
   if (!x) return std::nullopt;
   StartState start = in_motion(*x);
   start.from_frames = true;
@@ -103,17 +101,17 @@ std::optional<StartState> Start::find_in_motion(const Situation& now, const Inge
 MapAlignment Start::begin(const StartState& start, const std::optional<Estimate>& last_good, const Advice& advice,
                           Ingest& ingest, Ekf& ekf, Sources& sources, Records& records) {
   ekf.start(start.x, start.sigma, scale_is_given());
+  if (start.residual.size() > 0) ekf.apply(start.H, 0, start.residual, CameraUpdate::considered);
+  MapAlignment alignment;
   if (start.alignment) {
     ingest.drop_before(start.x.t_ns);
-  } else if (start.residual.size() > 0) {
-    ingest.drop_readings();  // of the time when it stood
-  }
-  if (start.residual.size() > 0) ekf.apply(start.H, 0, start.residual, CameraUpdate::considered);
-  MapAlignment alignment = start.alignment.value_or(MapAlignment{});
-  if (start.alignment) {
+    alignment = *start.alignment;
     given_.reset();
-  } else if (last_good) {
-    alignment = align_after_restart(*last_good, ekf.state().imu, ingest.imu(), calibration_.imu.gyro_noise);
+  } else {
+    if (start.residual.size() > 0) ingest.drop_readings();  // of the time when it stood
+    if (last_good) {
+      alignment = align_after_restart(*last_good, ekf.state().imu, ingest.imu(), calibration_.imu.gyro_noise);
+    }
   }
   if (start.from_frames) {
     ingest.drop_before(start.x.t_ns);
@@ -121,7 +119,7 @@ MapAlignment Start::begin(const StartState& start, const std::optional<Estimate>
     for (std::size_t i = 0; i + 1 < moving_.frames().size(); ++i) {
       const MovingStart::TimedFrame& frame = moving_.frames()[i];
       sources.advance(frame.t_ns, advice, ingest, ekf, records);
-      sources.use_image(frame.features, false, advice, ekf, records);
+      sources.update(&frame.features, false, advice, ekf, records);
     }
     records.statistics = statistics;
   }
@@ -171,12 +169,11 @@ std::optional<StartState> Start::standing(TimeNs t_ns, const ImuStatistics& imu)
   const double accel_sigma = std::hypot(calibration_.imu.accel_noise / root_duration, kShakenAccel);
   const double gyro_sigma = calibration_.imu.gyro_noise / root_duration;
   start.H.setZero(6, err::imu_size);
-  start.residual.resize(6);
+  start.residual.setZero(6);  // that of the rate stays
   start.H.block<3, 3>(0, err::theta) = x.R_WB.transpose() * skew(-kGravity_W) / accel_sigma;
   start.H.block<3, 3>(0, err::b_a) = Eigen::Matrix3d::Identity() / accel_sigma;
-  start.residual.head<3>() = (imu.accel_mean - gravity_B - x.b_a) / accel_sigma;
+  start.residual.head<3>() = (imu.accel_mean - gravity_B) / accel_sigma;
   start.H.block<3, 3>(3, err::b_g) = Eigen::Matrix3d::Identity() / gyro_sigma;
-  start.residual.tail<3>() = (imu.gyro_mean - x.b_g) / gyro_sigma;
   return start;
 }
 
@@ -216,7 +213,7 @@ Eigen::VectorXd Start::sigma() const {
     sigma.segment<err::lens_size>(err::lens(static_cast<int>(i))) = lens_sigma(prior, calibration_.cameras[i]);
   }
   if (online.time_offset && !calibration_.cameras.empty()) sigma(err::time_offset) = prior.time_offset;
-  if (uses_wheels()) {
+  if (uses_wheels(config_, calibration_)) {
     const auto beams = calibration_.lasers ? static_cast<Eigen::Index>(calibration_.lasers->beams.size()) : 0;
     sigma.segment<2>(err::normal).setConstant(config_.odometer.normal_prior);
     if (online.wheels) sigma.segment<2>(err::wheel_radius).setConstant(prior.wheel_radius);

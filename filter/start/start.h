@@ -37,22 +37,23 @@ class Start {
   void give(const GivenStart& start) { given_ = start; }
   /// What the other one was given.
   void succeed(const Start& before) { given_ = before.given_; }
-  /// What the last call of find() or find_in_motion() lacked; without meaning where it found a start.
+  /// What the last call of find() lacked; without meaning where it found a start.
   [[nodiscard]] Reason waits_for() const { return waits_for_; }
 
-  /// The vehicle at a frame, without a state.
+  /// The vehicle at a frame.
   struct Situation {
     const FeatureFrame& frame;
-    TimeNs t_ns = 0;  ///< IMU time
+    TimeNs t_ns = 0;       ///< IMU time
+    ImuStatistics recent;  ///< of the inertial samples
     bool stands = false;
-    bool rolls = false;     ///< the wheels carry it
-    bool restarts = false;  ///< not the first start
-    CameraState cameras;
+    bool rolls = false;         ///< the wheels carry it
+    bool restarts = false;      ///< not the first start
+    bool lost = false;          ///< there is a state
+    bool contradicted = false;  ///< which the cameras contradict
   };
-  /// The one that was given, or else the first that can: standing, rolling, moving with two cameras.
-  [[nodiscard]] std::optional<StartState> find(const Situation& now, const ImuStatistics& recent, const Ingest& ingest);
-  /// In place of a state that the cameras contradict, of the frames since `frame` was first given: moving alone.
-  [[nodiscard]] std::optional<StartState> find_in_motion(const Situation& now, const Ingest& ingest, bool contradicted);
+  /// The one that was given, or else the first that can: standing, rolling, moving with two cameras. Where there is a
+  /// state, moving alone, once that is contradicted.
+  [[nodiscard]] std::optional<StartState> find(const Situation& now, const Ingest& ingest);
   void forget_frames() { moving_.clear(); }
 
   /// The filter begins there, and takes in the frames since; the last one is at hand, and not taken in here. Where the
@@ -67,8 +68,8 @@ class Start {
 
  private:
   [[nodiscard]] std::optional<StartState> as_given(TimeNs t_ns, const ImuBuffer& imu);
+  [[nodiscard]] std::optional<StartState> moving(const Situation& now, const ImuBuffer& imu);
   [[nodiscard]] std::optional<StartState> standing(TimeNs t_ns, const ImuStatistics& imu) const;
-  [[nodiscard]] bool uses_wheels() const;
   [[nodiscard]] Eigen::VectorXd sigma() const;
   [[nodiscard]] StartState in_motion(const ImuState& x) const;
 

@@ -1,8 +1,7 @@
 #include "filter/start/start_fit.h"
 
 #include <Eigen/Cholesky>
-
-#include "filter/ekf/turn_between.h"
+#include <Eigen/Geometry>
 
 namespace ear {
 
@@ -33,6 +32,10 @@ std::optional<Eigen::Matrix<double, N, 1>> StartFit<N>::solve() const {
 
 template class StartFit<9>;
 template class StartFit<12>;
+
+Eigen::Matrix3d turn_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  return Eigen::Quaterniond::FromTwoVectors(a, b).toRotationMatrix();
+}
 
 ImuState start_state(TimeNs t_ns, const Eigen::Vector3d& v_B, const Eigen::Vector3d& gravity_B,
                      const Eigen::Vector3d& b_g, const Eigen::Vector3d& b_a) {

@@ -40,6 +40,9 @@ class StartFit {
   double rows_ = 0.0;
 };
 
+/// The shortest turn that takes the direction of `a` to that of `b`; neither is zero.
+[[nodiscard]] Eigen::Matrix3d turn_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b);
+
 /// With velocity `v_B` and gravity `gravity_B` in the body at `t_ns`.
 [[nodiscard]] ImuState start_state(TimeNs t_ns, const Eigen::Vector3d& v_B, const Eigen::Vector3d& gravity_B,
                                    const Eigen::Vector3d& b_g, const Eigen::Vector3d& b_a);

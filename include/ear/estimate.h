@@ -46,10 +46,10 @@ struct FrameStatistics {
   int features_used = 0;        ///< tracks that updated the filter
   int features_rejected = 0;    ///< tracks that failed triangulation or the gate
   int clones = 0;               ///< clones in the window
-  int wheel_rows_used = 0;      ///< rows of the odometer that updated the filter since the frame before
-  int wheel_rows_rejected = 0;  ///< rows of the odometer that failed the gate
-  int beams_used = 0;           ///< laser ranges that updated the filter since the frame before
-  int beams_rejected = 0;       ///< laser ranges that failed the gate
+  int wheel_rows_used = 0;      ///< rows of the odometer since the frame before that fit, by their scores
+  int wheel_rows_rejected = 0;  ///< those that do not; they update the filter with less weight
+  int beams_used = 0;           ///< laser ranges since the frame before that passed the gate
+  int beams_rejected = 0;       ///< those that failed it; they update the filter with less weight
   bool standing = false;        ///< the vehicle was held by a standstill update
   bool on_ground = false;       ///< the wheels carry the vehicle
 };
@@ -110,7 +110,7 @@ struct InputCounts {
   StreamCounts encoder;           ///< gaps: longer than 0.25 s
   StreamCounts laser;             ///< gaps: longer than 0.25 s
   StreamCounts camera;            ///< frames; far_ahead: no inertial samples reach their time; gaps: longer than 0.25 s
-  std::uint64_t imu_spikes = 0;   ///< single samples far from both their neighbours, whose mean was taken
+  std::uint64_t imu_spikes = 0;   ///< of one to five samples, crossed by a line
   std::uint64_t clock_jumps = 0;  ///< of one sensor's clock against all others, which were taken out
   std::uint64_t features_rejected = 0;  ///< not finite, outside any image, or twice in a frame
   std::uint64_t steps_rejected = 0;     ///< calls of Odometry::step for a time not later than the state, or without IMU

@@ -33,7 +33,7 @@ struct PriorConfig {
   double focal_length = 1e-3;       ///< of each camera, relative
   double principal_point = 0.5;     ///< [px] of each camera, each axis
   double time_offset = 2e-3;        ///< [s] camera against IMU
-  double wheel_radius = 4e-3;       ///< of both wheels alike, relative
+  double wheel_radius = 4e-3;       ///< of each wheel, relative; of their mean, over sqrt(2)
   double wheel_apart = 1e-3;        ///< of each wheel by itself, relative
   double wheel_scale = 5e-2;        ///< of both wheels alike, relative, where neither camera nor lasers exist
   double track_width = 5e-3;        ///< relative
@@ -127,7 +127,7 @@ struct FilterConfig {
   int max_track_updates = 40;          ///< features used per frame, those with most observations first
   double feature_sigma_px = 0.6;       ///< one observation of one feature, one axis [px]
   double huber_px = 1.5;               ///< observations further off than this weigh less [px]
-  double gate_probability = 0.98;      ///< chi-square gate of every feature and row
+  double gate_probability = 0.98;      ///< chi-square gate of every feature; wheels and beams weigh less instead
   double keyframe_parallax_px = 12.0;  ///< a clone with less median parallax to its elder makes room first [px]
   double max_imu_gap = 0.05;           ///< [s] a longer gap in the IMU data is bridged, counted, and its noise raised
   PriorConfig prior;

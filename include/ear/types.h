@@ -15,6 +15,7 @@ using TimeNs = std::int64_t;
 
 /// Stamps farther from zero than this [ns], 142 years, are no times: differences of two fit 64 bits.
 inline constexpr TimeNs kLargestStamp = 4'500'000'000'000'000'000;
+[[nodiscard]] constexpr bool is_time(TimeNs t_ns) { return t_ns > -kLargestStamp && t_ns < kLargestStamp; }
 
 /// to - from; the largest or smallest number where the difference is none: stamps come from outside.
 [[nodiscard]] constexpr TimeNs duration_ns(TimeNs from, TimeNs to) {

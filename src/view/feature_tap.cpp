@@ -37,7 +37,6 @@ class Tapped final : public Estimator {
   void set_window(int clones) override { inner_->set_window(clones); }
   [[nodiscard]] InputCounts input_counts() const override { return inner_->input_counts(); }
   [[nodiscard]] FrameStamp check_stamp(TimeNs t_ns) const override { return inner_->check_stamp(t_ns); }
-  [[nodiscard]] TimeNs camera_time(TimeNs imu_time_ns) const override { return inner_->camera_time(imu_time_ns); }
   [[nodiscard]] CalibrationState calibration() const override { return inner_->calibration(); }
 
  private:

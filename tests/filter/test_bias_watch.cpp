@@ -106,6 +106,16 @@ TEST_CASE("bias_watch: what another source misled does not count") {
   CHECK(watch.judge(changes_by(correction, Vector6::Constant(1e-4)), 3 * kStep).any());
 }
 
+TEST_CASE("bias_watch: stamps may be negative") {
+  constexpr TimeNs start_ns = -10'000'000'000;
+  BiasWatch watch;
+  Vector6 correction = Vector6::Zero();
+  correction(0) = 0.03;  // three standard deviations
+  CHECK_FALSE(watch.judge(changes_by(correction, Vector6::Constant(1e-4)), start_ns).any());
+  correction(0) = 0.06 * 1.05;
+  CHECK(watch.judge(changes_by(correction, Vector6::Constant(1e-4)), start_ns + kStep).any());
+}
+
 TEST_CASE("bias_watch: small jumps widen the covariance, and report no fault") {
   BiasWatch watch;
   Vector6 correction = Vector6::Zero();

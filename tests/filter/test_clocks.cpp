@@ -174,19 +174,60 @@ TEST_CASE("imu clock: a verdict that later readings contradict is undone") {
     add(resumed + 5 * kMs * late);
     observe(t + 10 * kMs * late);
   }
+  CHECK(clock.jumps_corrected() == 1);
+  CHECK(clock.take_correction());
   for (TimeNs queued = t + 40 * kMs; queued < resumed; queued += 10 * kMs) observe(queued);
   for (TimeNs now = resumed + 20 * kMs; now < resumed + 500 * kMs; now += 5 * kMs) {
     add(now);
     observe(now);
     if (now > resumed + 200 * kMs) CHECK(newest == now);
   }
+  CHECK(clock.jumps_corrected() == 0);
+  CHECK_FALSE(clock.take_correction());  // no sensor was at fault
+}
+
+TEST_CASE("imu clock: another jump that turns out to be none does not change what is undone of the first") {
+  ImuClock clock;
+  TimeNs newest = 0;
+  const auto fetch = [&] {
+    while (const auto s = clock.next()) newest = s->t_ns;
+  };
+  const auto add = [&](TimeNs t) {
+    ImuSample sample;
+    sample.t_ns = t;
+    clock.add(sample);
+    fetch();
+  };
+  const auto observe = [&](TimeNs t) {
+    clock.observe(ImuClock::Stream::encoder, t);
+    fetch();
+  };
+  TimeNs t = 0;
+  for (; t < kJumpAt; t += 5 * kMs) {
+    add(t);
+    observe(t);
+  }
+  const TimeNs jump = 300 * kMs;  // of all, as it turns out
+  for (int i = 0; i < 4; ++i, t += 5 * kMs) {
+    add(t + jump);
+    observe(t);
+  }
+  REQUIRE(clock.jumps_corrected() == 1);
+  add(t + jump - 100 * kMs);  // a false stamp
+  CHECK(clock.waiting());
+  for (t += 5 * kMs; t < kJumpAt + 500 * kMs; t += 5 * kMs) {
+    add(t + jump);
+    observe(t + jump);
+  }
+  CHECK(clock.jumps_corrected() == 0);
+  CHECK(newest == t - 5 * kMs + jump);
 }
 
 namespace {
 
 /// What comes out of a stream's clock: camera frames each 33 ms, 12 ms after their exposure, or as `delay` says.
 std::vector<Out> run_stream(const Driver& driver, const std::function<TimeNs(TimeNs)>& delay = {},
-                            const std::function<bool(TimeNs)>& time_is_known = {}) {
+                            const std::function<bool(TimeNs)>& time_is_known = {}, int* jumps = nullptr) {
   StreamClock clock;
   std::vector<Out> out;
   for (TimeNs t = 0; t < kEnd; t += 33 * kMs) {
@@ -196,6 +237,7 @@ std::vector<Out> run_stream(const Driver& driver, const std::function<TimeNs(Tim
     const auto stamp = clock.correct(driver(t), known ? std::optional(arrival / (5 * kMs) * (5 * kMs)) : std::nullopt);
     if (stamp) out.push_back({t, *stamp});
   }
+  if (jumps != nullptr) *jumps = clock.jumps();
   return out;
 }
 
@@ -241,7 +283,8 @@ TEST_CASE("stream clock: what looked like a jump while the process stood still i
   const auto delay = [resumed](TimeNs t) {
     return t >= resumed && t < resumed + 100 * kMs ? kJumpAt - t + 12 * kMs : 12 * kMs;
   };
-  const std::vector<Out> out = run_stream(stalled, delay);
+  int jumps = -1;
+  const std::vector<Out> out = run_stream(stalled, delay, {}, &jumps);
   REQUIRE(!out.empty());
   bool taken_out = false;
   for (const Out& o : out) {
@@ -249,6 +292,7 @@ TEST_CASE("stream clock: what looked like a jump while the process stood still i
     if (o.t > resumed + 500 * kMs) CHECK(o.stamp == o.t);
   }
   CHECK(taken_out);  // or it tests nothing
+  CHECK(jumps == 0);
   CHECK(out.back().t > kEnd - 100 * kMs);
 }
 

@@ -10,6 +10,7 @@
 #include "tests/support/about.h"
 #include "tests/support/check_jacobian.h"
 #include "tests/support/random_state.h"
+#include "tests/support/state_error.h"
 
 using namespace ear;
 using namespace ear::test;
@@ -83,7 +84,7 @@ double mean_chi_squared(std::mt19937_64& rng, const State& x, const Eigen::Vecto
   for (int run = 0; run < kRuns; ++run) {
     Eigen::VectorXd d = Eigen::VectorXd::Zero(x.error_size());
     for (Eigen::Index i = 0; i < sigma.size(); ++i) d(i) = sigma(i) * normal(rng);
-    const Eigen::Vector3d e = f(boxplus(x, d)).p_BiBj - expected.p_BiBj;
+    const Eigen::Vector3d e = f(with_error(x, d)).p_BiBj - expected.p_BiBj;
     sum += e.dot(llt.solve(e)) / kRuns;
   }
   return sum;
@@ -102,14 +103,14 @@ TEST_CASE("displacements: the IMU's is where propagation takes the body, and H i
       end = integrate(end, gyro_B, accel_B, dt);
     });
     const ImuMotion motion = imu_motion(x.imu, samples, kEnd, ImuCalibration{});
-    CHECK((motion.p_BiBj - x.imu.R_WB.transpose() * (end.p_WB - x.imu.p_WB)).norm() < 1e-9);
-    CHECK((motion.R_BiBj - x.imu.R_WB.transpose() * end.R_WB).norm() < 1e-9);
+    CHECK((motion.T_BiBj.p - x.imu.R_WB.transpose() * (end.p_WB - x.imu.p_WB)).norm() < 1e-9);
+    CHECK((motion.T_BiBj.R - x.imu.R_WB.transpose() * end.R_WB).norm() < 1e-9);
     CHECK(motion.duration == doctest::Approx(0.2));
     const ImuBuffer steady = random_samples(rng, x, 0.0, 0.0);
     const auto moved = [&](const ImuBuffer& measured, const Eigen::VectorXd& d) -> Eigen::VectorXd {
       Eigen::VectorXd error = Eigen::VectorXd::Zero(x.error_size());
       error.head<err::imu_size>() = d;
-      return imu_motion(boxplus(x, error).imu, measured, kEnd, ImuCalibration{}).p_BiBj;
+      return imu_motion(with_error(x, error).imu, measured, kEnd, ImuCalibration{}).T_BiBj.p;
     };
     check_jacobian([&](const Eigen::VectorXd& d) { return moved(steady, d); },
                    imu_motion(x.imu, steady, kEnd, ImuCalibration{}).H, 1e-3);
@@ -131,7 +132,7 @@ TEST_CASE("displacements: the IMU's noise spreads it as its covariance says") {
   constexpr int kRuns = 1000;
   for (int run = 0; run < kRuns; ++run) {
     const ImuBuffer samples = random_samples(rng, x, sample_noise);
-    squares += (imu_motion(x.imu, samples, kEnd, noise).p_BiBj - clean.p_BiBj).squaredNorm() / kRuns;
+    squares += (imu_motion(x.imu, samples, kEnd, noise).T_BiBj.p - clean.T_BiBj.p).squaredNorm() / kRuns;
   }
   CHECK(squares == about(clean.covariance.trace(), 0.1));
 }

@@ -44,8 +44,8 @@ ImuBuffer samples() {
 }
 
 /// A row that measures the velocity along x.
-GroundRows<2> velocity_row(double residual, double sigma) {
-  GroundRows<2> z;
+GroundRows velocity_row(double residual, double sigma) {
+  GroundRows z;
   z.H(0, ground_column(err::nu)) = 1.0;
   z.residual(0) = residual;
   z.sigma(0) = sigma;
@@ -54,7 +54,7 @@ GroundRows<2> velocity_row(double residual, double sigma) {
 }
 
 /// One row, if the gate takes it: whether it does.
-bool apply_if_it_fits(Ekf& ekf, GroundRows<2>& z, double weight) {
+bool apply_if_it_fits(Ekf& ekf, GroundRows& z, double weight) {
   if (!ekf.test(z.H.row(0), z.residual(0), z.sigma(0)).fits) return false;
   ekf.apply(z, weight, CameraUpdate::learned);
   return true;
@@ -116,7 +116,7 @@ TEST_CASE("ekf: the gate takes what the state and the noise allow, and nothing e
   for (const double share : {-0.99, 0.99, 1.01, -1.01}) {
     CAPTURE(share);
     Ekf ekf = started();
-    GroundRows<2> z = velocity_row(share * limit, sigma);
+    GroundRows z = velocity_row(share * limit, sigma);
     const bool used = apply_if_it_fits(ekf, z, 1.0);
     CHECK(used == (std::abs(share) < 1.0));
     CHECK((ekf.state().imu.v_W.x() != 1.0) == used);
@@ -126,14 +126,14 @@ TEST_CASE("ekf: the gate takes what the state and the noise allow, and nothing e
 
 TEST_CASE("ekf: what is no number never passes") {
   Ekf ekf = started();
-  GroundRows<2> z = velocity_row(std::nan(""), 0.05);
+  GroundRows z = velocity_row(std::nan(""), 0.05);
   CHECK_FALSE(apply_if_it_fits(ekf, z, 1.0));
   CHECK(ekf.possible());
 }
 
 TEST_CASE("ekf: a weight divides the noise of a row: R / w^2") {
   Ekf weighted = started(), noisy = started();
-  GroundRows<2> z = velocity_row(0.1, 0.05);
+  GroundRows z = velocity_row(0.1, 0.05);
   CHECK(apply_if_it_fits(weighted, z, 0.5));
   z = velocity_row(0.1, 0.1);
   CHECK(apply_if_it_fits(noisy, z, 1.0));

@@ -11,6 +11,7 @@
 #include <random>
 #include <vector>
 
+#include "filter/ekf/kernel_matrix.h"
 #include "filter/kernels/filter_kernels.h"
 
 namespace ear {
@@ -27,10 +28,17 @@ MatrixXd random_matrix(std::mt19937_64& rng, int rows, int columns) {
   return MatrixXd::NullaryExpr(stride_for(rows), columns, [&](Eigen::Index, Eigen::Index) { return normal(rng); });
 }
 
-ConstMatrix in(const MatrixXd& M) { return {M.data(), M.outerStride()}; }
-MutableMatrix out(MatrixXd& M) { return {M.data(), M.outerStride()}; }
+/// Those that this build has and this processor can run, the best one last.
+std::vector<FilterKernels> all_filter_kernels() {
+  std::vector<FilterKernels> all;
+  for (const Kernels kind : {Kernels::plain, Kernels::neon, Kernels::sse2, Kernels::sse4, Kernels::avx2}) {
+    const FilterKernels kernels = filter_kernels(kind);  // or the next best
+    if (all.empty() || all.back().kind != kernels.kind) all.push_back(kernels);
+  }
+  return all;
+}
 
-/// Runs `work` with every variant: the same bits; the result of the last.
+/// Runs `work` with every variant: the same bits; the result of the first.
 template <class Work>
 auto by_all(const Work& work) {
   const std::vector<FilterKernels> all = all_filter_kernels();
@@ -62,7 +70,7 @@ TEST_CASE("kernels: products of some columns") {
       std::iota(used.begin(), used.end(), 7);
       const MatrixXd product = by_all([&](const FilterKernels& kernels) {
         MatrixXd C = MatrixXd::Zero(stride_for(rows), columns);
-        kernels.multiply(in(A), in(B), used.data(), 15, rows, columns, out(C));
+        kernels.multiply(readable(A), readable(B), used.data(), 15, rows, columns, writable(C));
         return MatrixXd(C.topRows(rows));
       });
       CHECK((product - A.block(0, 7, rows, 15) * B.middleRows(7, 15)).norm() < kClose * rows * columns);
@@ -77,7 +85,7 @@ TEST_CASE("kernels: the lower triangle of A^T B") {
     const MatrixXd B = random_matrix(rng, 92, size);
     const MatrixXd lower = by_all([&](const FilterKernels& kernels) {
       MatrixXd C = MatrixXd::Zero(stride_for(size), size);
-      kernels.multiply_transposed(in(A), in(B), 92, size, out(C));
+      kernels.multiply_transposed(readable(A), readable(B), 92, size, writable(C));
       return MatrixXd(C.topRows(size).triangularView<Eigen::Lower>());
     });
     const MatrixXd expected = A.topRows(92).transpose() * B.topRows(92);
@@ -98,11 +106,11 @@ TEST_CASE("kernels: an update of a covariance") {
         MatrixXd M = MatrixXd::Zero(stride_for(columns), columns + 1);  // the last column: z
         M.topLeftCorner(columns, columns) = S.triangularView<Eigen::Lower>();
         M.col(columns).head(columns) = root.col(0).head(columns);
-        CHECK(kernels.factorize(out(M), columns, M.col(columns).data()));
+        CHECK(kernels.factorize(writable(M), columns, M.col(columns).data()));
         MatrixXd result = M.topRows(columns);
         result.leftCols(columns) = MatrixXd(result.leftCols(columns).triangularView<Eigen::Lower>());
         M.topLeftCorner(columns, columns) = -S;
-        CHECK_FALSE(kernels.factorize(out(M), columns, M.col(columns).data()));
+        CHECK_FALSE(kernels.factorize(writable(M), columns, M.col(columns).data()));
         return result;
       });
       CHECK((factored.leftCols(columns) - factor).norm() < 1e4 * kClose * factor.norm());
@@ -110,7 +118,7 @@ TEST_CASE("kernels: an update of a covariance") {
       const MatrixXd Y = random_matrix(rng, size, columns);
       const MatrixXd solved = by_all([&](const FilterKernels& kernels) {
         MatrixXd X = Y;
-        kernels.solve(in(L), size, columns, out(X));
+        kernels.solve(readable(L), size, columns, writable(X));
         return MatrixXd(X.topRows(size));
       });
       CHECK((solved * factor.transpose() - Y.topRows(size)).norm() < 1e4 * kClose * Y.norm());
@@ -119,7 +127,7 @@ TEST_CASE("kernels: an update of a covariance") {
       const MatrixXd lower = MatrixXd(half.triangularView<Eigen::Lower>());
       const MatrixXd difference = by_all([&](const FilterKernels& kernels) {
         MatrixXd P = half;
-        kernels.subtract_square(in(Y), columns, size, out(P));
+        kernels.subtract_square(readable(Y), columns, size, writable(P));
         return MatrixXd(P.topLeftCorner(size, size));
       });
       CHECK((difference == difference.transpose()));
@@ -141,7 +149,7 @@ TEST_CASE("kernels: an error carried along, whatever the number of rows") {
     const MatrixXd M = random_matrix(rng, rows, 15);
     const MatrixXd carried = by_all([&](const FilterKernels& kernels) {
       MatrixXd result = M;
-      kernels.carry(Phi.data(), rows, out(result));
+      kernels.carry(Phi.data(), rows, writable(result));
       return result;
     });
     CHECK((carried.topRows(rows) - M.topRows(rows) * Phi.transpose()).norm() < kClose * rows * 100);
@@ -170,7 +178,7 @@ TEST_CASE("kernels: rows of a singular sum, the largest pivot first") {
       pivots.head(size) = scale.head(size) = A.diagonal().head(size);
       MatrixXd Ht = MatrixXd::Zero(stride_for(size), size);
       const int count =
-          kernels.pivoted_rows(in(A), size, b.data(), pivots.data(), scale.data(), 1e-10, out(Ht), z.data());
+          kernels.pivoted_rows(readable(A), size, b.data(), pivots.data(), scale.data(), 1e-10, writable(Ht), z.data());
       return Rows{Ht.topLeftCorner(size, count).transpose(), z.head(count)};
     });
     REQUIRE(rows.r.size() == rank);

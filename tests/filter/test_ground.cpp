@@ -8,6 +8,7 @@
 
 #include "tests/support/check_jacobian.h"
 #include "tests/support/random_state.h"
+#include "tests/support/state_error.h"
 
 using namespace ear;
 using namespace ear::test;
@@ -129,7 +130,7 @@ TEST_CASE("ground: Jacobians are the derivatives") {
         Eigen::VectorXd d = Eigen::VectorXd::Zero(x.error_size());
         d.head(part.size()) = part;
         d.segment<2>(err::wheel_radius).setZero();
-        const State moved = boxplus(x, d);
+        const State moved = with_error(x, d);
         return Eigen::VectorXd::Constant(
             1, predict_range(moved, moved.imu.R_WB, laser, moved.odometer.beam_offset(beam)).range);
       };
@@ -141,7 +142,7 @@ TEST_CASE("ground: Jacobians are the derivatives") {
       Eigen::VectorXd d = Eigen::VectorXd::Zero(x.error_size());
       d.head(part.size()) = part;
       d.segment<3>(err::odometer).setZero();  // part of the noise: unevenness under the wheels is far larger
-      const State moved = boxplus(x, d);
+      const State moved = with_error(x, d);
       return Eigen::VectorXd::Constant(1, predict_axle(moved, moved.imu.R_WB).lean);
     };
     check_jacobian(lean, H_axle);
@@ -150,7 +151,7 @@ TEST_CASE("ground: Jacobians are the derivatives") {
       Eigen::VectorXd d = Eigen::VectorXd::Zero(x.error_size());
       d.segment<3>(err::theta) = part.head<3>();
       d.segment<2>(err::normal) = part.tail<2>();
-      const State moved = boxplus(x, d);
+      const State moved = with_error(x, d);
       const Slope s = slope(moved.imu.R_WB * y_B, moved.ground.n_W);
       return Eigen::Vector2d(s.along, s.across);
     };

@@ -41,8 +41,7 @@ struct Drive {
   }
 
   void imu_until(double end) {
-    for (; imu_t <= end; imu_t += 0.01)
-      monitor.add_imu({at(imu_t), {0.0, 0.0, 1e-3 * imu_t}, {0.0, 0.0, 9.8 + 1e-3 * imu_t}}, 0.05);
+    for (; imu_t <= end; imu_t += 0.01) monitor.add_imu(at(imu_t), 0.05);
   }
   void go_on(double duration) {
     for (const double end = t + duration; t < end; t += 0.05) {
@@ -51,7 +50,7 @@ struct Drive {
       monitor.add_laser({at(t), {0.1 + 1e-3 * t, 0.2 + 1e-3 * t, 0.3 + 1e-3 * t}}, Verdict::accepted,
                         LaserCalibration{}, {}, at(t));
       frame.t_ns = at(t);
-      usable = monitor.check_image(frame.agreement, at(t) + stamp_error, at(t));
+      usable = monitor.check_image(frame.agreement, at(t) + stamp_error);
       monitor.add_frame(frame, records);
     }
   }
@@ -416,7 +415,7 @@ TEST_CASE("health: wheels that are slower than the frames carry the estimate unt
   frame.statistics.on_ground = true;
   Records records{};
   const auto step = [&](double t, bool reading) {
-    monitor.add_imu({at(t), {0.0, 0.0, 1e-3 * t}, {0.0, 0.0, 9.8 + 1e-3 * t}}, 0.05);
+    monitor.add_imu(at(t), 0.05);
     if (reading) monitor.add_encoder(Verdict::accepted, at(t));
     frame.t_ns = at(t);
     frame.statistics.wheel_rows_used = reading ? 5 : 0;
@@ -432,4 +431,25 @@ TEST_CASE("health: wheels that are slower than the frames carry the estimate unt
   }
   for (int k = 0; k < 10; ++k, t += 0.04) step(t, false);
   CHECK(monitor.health().aiding == Aiding::none);
+}
+
+TEST_CASE("health: a sensor that never spoke is silent, whatever the stamps") {
+  for (const double start : {-1000.0, -100.0, 0.0}) {
+    CAPTURE(start);
+    Calibration calibration = vehicle();
+    calibration.cameras.clear();
+    HealthMonitor monitor(calibration, true, true);
+    HealthMonitor::Frame frame;
+    frame.image = false;
+    frame.running = true;
+    frame.statistics.on_ground = true;
+    for (double t = start; t < start + 1.0; t += 0.05) {
+      monitor.add_imu(at(t), 0.05);
+      frame.t_ns = at(t);
+      monitor.add_frame(frame, Records{});
+    }
+    for (const Source source : {Source::wheel_left, Source::wheel_right, Source::beam_0, Source::beam_2}) {
+      CHECK(monitor.health().faulty[index_of(source)]);
+    }
+  }
 }

@@ -63,14 +63,14 @@ Judged judged_after(double seconds, const Rig& rig, unsigned seed) {
     const double turn =
         rig.turn_rate * motion.duration * (rig.time_offset > 0.0 ? std::sin(1e-9 * static_cast<double>(t_ns)) : 1.0);
     const Eigen::Matrix3d turned = exp_so3({turn, 0.0, 0.0});
-    motion.R_BiBj = turned * exp_so3(rig.gyro * kTurnSigma * draw(3));
-    motion.p_BiBj = rig.accel * kShiftSigma * draw(3);
+    motion.T_BiBj.R = turned * exp_so3(rig.gyro * kTurnSigma * draw(3));
+    motion.T_BiBj.p = rig.accel * kShiftSigma * draw(3);
     motion.covariance = Eigen::Matrix3d::Identity() * kShiftSigma * kShiftSigma;
     motion.turn_variance = kTurnSigma * kTurnSigma;
     const Eigen::VectorXd off = L * draw(6) + rig.shift / C(3, 3) * C.col(3);
     StereoMotion images;
-    images.R_B0B1 = turned * exp_so3({off(0), off(1), off(2) + rig.gyro_bias * motion.duration});
-    images.p_B0B1 = off.tail<3>();
+    images.T_B0B1.R = turned * exp_so3({off(0), off(1), off(2) + rig.gyro_bias * motion.duration});
+    images.T_B0B1.p = off.tail<3>();
     images.covariance = C;
     images.matches = images.fitting = 100;
     const std::optional<Innovation> excess = judged.score.add(motion, images, P, t_ns);
@@ -125,7 +125,7 @@ TEST_CASE("imu score: one image that is wrong changes little, and those in which
   motion.covariance = Eigen::Matrix3d::Identity() * kShiftSigma * kShiftSigma;
   motion.turn_variance = kTurnSigma * kTurnSigma;
   StereoMotion images;
-  images.R_B0B1 = exp_so3({0.1, 0.1, 0.1});
+  images.T_B0B1.R = exp_so3({0.1, 0.1, 0.1});
   images.covariance = covariance_of_images();
   images.matches = 100;
   images.fitting = 80;

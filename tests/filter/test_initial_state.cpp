@@ -104,7 +104,7 @@ TEST_CASE("initial state: an IMU that is slow has no gap between its samples") {
   CHECK(settings_for(FilterConfig{}, calibration).max_imu_gap == about(0.156, 0.01));
 }
 
-TEST_CASE("initial state: standard deviations that cannot be are named") {
+TEST_CASE("initial state: standard deviations, rates and offsets that cannot be are named") {
   using C = Calibration;
   const auto reason = [](const std::function<void(C&)>& spoil) {
     C calibration = vehicle();
@@ -131,6 +131,9 @@ TEST_CASE("initial state: standard deviations that cannot be are named") {
   CHECK(names(reason([](C& c) { c.lasers->offset_sigma = 0.0; }), "offset_sigma"));
   CHECK(names(reason([](C& c) { c.encoder->time_offset_sigma = 0.0; }), "the encoder's time_offset_sigma"));
   CHECK(names(reason([](C& c) { c.lasers->time_offset_sigma = -1.0; }), "the lasers' time_offset_sigma"));
+  for (const double rate_hz : {0.0, -200.0, std::nan(""), std::numeric_limits<double>::infinity()}) {
+    CHECK(names(reason([&](C& c) { c.imu.rate_hz = rate_hz; }), "imu rate_hz must be a positive number"));
+  }
   for (const double offset : {std::numeric_limits<double>::quiet_NaN(), 1e300, -4000.0}) {
     CHECK(names(reason([&](C& c) { c.encoder->time_offset = offset; }), "the encoder's time_offset must be a number"));
     CHECK(names(reason([&](C& c) { c.lasers->time_offset = offset; }), "the lasers' time_offset must be a number"));

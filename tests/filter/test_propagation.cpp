@@ -6,6 +6,7 @@
 #include "tests/support/about.h"
 #include "tests/support/check_jacobian.h"
 #include "tests/support/random_state.h"
+#include "tests/support/state_error.h"
 
 using namespace ear;
 using namespace ear::test;
@@ -24,7 +25,7 @@ ImuState disturbed(const ImuState& x, const Eigen::VectorXd& d) {
   state.imu = x;
   Eigen::VectorXd full = Eigen::VectorXd::Zero(err::clones);
   full.head<err::imu_size>() = d;
-  return boxplus(state, full).imu;
+  return with_error(state, full).imu;
 }
 
 }  // namespace

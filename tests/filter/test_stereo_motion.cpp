@@ -68,10 +68,10 @@ const Eigen::Vector3d kWay(0.15, -0.02, 0.03);
 
 TEST_CASE("stereo motion: without noise it is exact, from a start that knows nothing") {
   const Pair pair = look(exp_so3(kTurn), kWay, 0.0, 1);
-  const auto motion = stereo_motion(matched(pair), cameras(), StereoMotion{}, kSigma);
+  const auto motion = stereo_motion(matched(pair), cameras(), Pose{}, kSigma);
   REQUIRE(motion);
-  CHECK((motion->p_B0B1 - kWay).norm() < 1e-9);
-  CHECK(log_so3(motion->R_B0B1.transpose() * exp_so3(kTurn)).norm() < 1e-9);
+  CHECK((motion->T_B0B1.p - kWay).norm() < 1e-9);
+  CHECK(log_so3(motion->T_B0B1.R.transpose() * exp_so3(kTurn)).norm() < 1e-9);
   CHECK(motion->fitting == 100);
 }
 
@@ -93,9 +93,9 @@ TEST_CASE("stereo motion: what is known of the lenses' errors is taken out of th
   StereoMatches matches;
   CameraState known = cameras();
   known.lens_error = lenses;
-  const auto motion = stereo_motion(matches.find(pair.from, pair.to, known), cameras(), StereoMotion{}, kSigma);
+  const auto motion = stereo_motion(matches.find(pair.from, pair.to, known), cameras(), Pose{}, kSigma);
   REQUIRE(motion);
-  CHECK((motion->p_B0B1 - kWay).norm() < 1e-9);
+  CHECK((motion->T_B0B1.p - kWay).norm() < 1e-9);
 }
 
 TEST_CASE("stereo motion: a right camera that is not where the calibration says is no turn of a vehicle that stands") {
@@ -103,19 +103,19 @@ TEST_CASE("stereo motion: a right camera that is not where the calibration says 
   for (FeatureFrame* const frame : {&pair.from, &pair.to}) {
     for (FeatureObservation& feature : frame->features) feature.right += Eigen::Vector2d(0.002, 0.003);
   }
-  const auto motion = stereo_motion(matched(pair), cameras(), StereoMotion{}, kSigma);
+  const auto motion = stereo_motion(matched(pair), cameras(), Pose{}, kSigma);
   REQUIRE(motion);
-  CHECK(motion->p_B0B1.norm() < 1e-9);
-  CHECK(log_so3(motion->R_B0B1).norm() < 1e-9);
+  CHECK(motion->T_B0B1.p.norm() < 1e-9);
+  CHECK(log_so3(motion->T_B0B1.R).norm() < 1e-9);
 }
 
 TEST_CASE("stereo motion: with noise the error is about what the covariance says") {
   double sum = 0.0;
   for (unsigned seed = 0; seed < 100; ++seed) {
     const Pair pair = look(exp_so3(kTurn), 0.2 * kWay, kSigma, seed);
-    const auto motion = stereo_motion(matched(pair), cameras(), StereoMotion{}, kSigma);
+    const auto motion = stereo_motion(matched(pair), cameras(), Pose{}, kSigma);
     REQUIRE(motion);
-    const Eigen::Vector3d e = motion->p_B0B1 - 0.2 * kWay;
+    const Eigen::Vector3d e = motion->T_B0B1.p - 0.2 * kWay;
     sum += e.dot(motion->p_covariance().ldlt().solve(e)) / 100.0;
   }
   CHECK(sum > 1.5);
@@ -128,9 +128,9 @@ TEST_CASE("stereo motion: a third of the features on something that moves does n
     pair.to.features[i].left.x() += 0.05;
     pair.to.features[i].right.x() += 0.05;
   }
-  const auto motion = stereo_motion(matched(pair), cameras(), StereoMotion{}, kSigma);
+  const auto motion = stereo_motion(matched(pair), cameras(), Pose{}, kSigma);
   REQUIRE(motion);
-  CHECK((motion->p_B0B1 - kWay).norm() < 0.03);
+  CHECK((motion->T_B0B1.p - kWay).norm() < 0.03);
 }
 
 TEST_CASE("stereo motion: images the wrong way round tell nothing") {
@@ -138,33 +138,32 @@ TEST_CASE("stereo motion: images the wrong way round tell nothing") {
   for (FeatureFrame* frame : {&pair.from, &pair.to}) {
     for (FeatureObservation& o : frame->features) std::swap(o.left, o.right);
   }
-  CHECK_FALSE(stereo_motion(matched(pair), cameras(), StereoMotion{}, kSigma));
+  CHECK_FALSE(stereo_motion(matched(pair), cameras(), Pose{}, kSigma));
 }
 
 TEST_CASE("frame check: the right motion fits, a wrong one does not") {
   const Pair pair = look(exp_so3(kTurn), kWay, kSigma, 5);
-  const FrameCheck check(kSigma, kGate);
-  const FrameAgreement right = check.compare(matched(pair), {exp_so3(kTurn), kWay, 0.0}, cameras());
+  const FrameCheck check(kSigma, 1.0);
+  const FrameAgreement right = check.compare(matched(pair), {exp_so3(kTurn), kWay}, 0.0, cameras(), kGate);
   CHECK(right.matches == 100);
   CHECK(right.left < 0.05);
   CHECK(right.right < 0.05);
-  const FrameAgreement wrong =
-      check.compare(matched(pair), {Eigen::Matrix3d::Identity(), Eigen::Vector3d::Zero(), 0.0}, cameras());
+  const FrameAgreement wrong = check.compare(matched(pair), Pose{}, 0.0, cameras(), kGate);
   CHECK(wrong.left > 0.9);
 }
 
 TEST_CASE("frame check: what turns a little more than predicted shows in the turn, not in the share") {
   const Eigen::Vector3d more(0.0005, -0.0003, 0.0007);
-  const FrameCheck check(kSigma, kGate);
+  const FrameCheck check(kSigma, 1.0);
   const Eigen::Matrix3d p_is_known = Eigen::Matrix3d::Identity() * 1e-10;
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
   double squares = 0.0;
   for (unsigned seed = 0; seed < 50; ++seed) {
     const Pair pair = look(exp_so3(kTurn) * exp_so3(more), 0.2 * kWay, kSigma, seed);
-    CHECK(check.compare(matched(pair), {exp_so3(kTurn), 0.2 * kWay, 0.0}, cameras()).left < 0.1);
-    const auto motion = stereo_motion(matched(pair), cameras(), StereoMotion{}, kSigma);
+    CHECK(check.compare(matched(pair), {exp_so3(kTurn), 0.2 * kWay}, 0.0, cameras(), kGate).left < 0.1);
+    const auto motion = stereo_motion(matched(pair), cameras(), Pose{}, kSigma);
     REQUIRE(motion);
-    const ExcessTurn turn = turn_beyond(*motion, exp_so3(kTurn), 0.2 * kWay, p_is_known);
+    const ExcessTurn turn = turn_beyond(*motion, {exp_so3(kTurn), 0.2 * kWay}, p_is_known);
     CHECK(turn.covariance.trace() < motion->covariance.topLeftCorner<3, 3>().trace());
     mean += turn.value / 50.0;
     const Eigen::Vector3d e = turn.value - more;
@@ -177,7 +176,7 @@ TEST_CASE("frame check: what turns a little more than predicted shows in the tur
 
 TEST_CASE("frame check: swapped images are seen at once") {
   Pair pair = look(Eigen::Matrix3d::Identity(), Eigen::Vector3d::Zero(), kSigma, 6);
-  const FrameCheck check(kSigma, kGate);
+  const FrameCheck check(kSigma, 1.0);
   CHECK(check.share_behind(pair.to, cameras()) == 0.0);
   for (FeatureObservation& o : pair.to.features) std::swap(o.left, o.right);
   CHECK(check.share_behind(pair.to, cameras()) > 0.9);

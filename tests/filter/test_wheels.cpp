@@ -6,6 +6,7 @@
 
 #include "tests/support/check_jacobian.h"
 #include "tests/support/random_state.h"
+#include "tests/support/state_error.h"
 
 using namespace ear;
 using namespace ear::test;
@@ -104,7 +105,7 @@ TEST_CASE("wheels: the Jacobian of one wheel is the derivative, and knows nothin
   const auto prediction = [&](const Eigen::VectorXd& part) -> Eigen::VectorXd {
     Eigen::VectorXd d = Eigen::VectorXd::Zero(x.error_size());
     d.head(part.size()) = part;
-    const State moved = boxplus(x, d);
+    const State moved = with_error(x, d);
     const WheelRows both = rows_of(moved, turn, gyro_B, OdometerModel::gyro);
     return -Eigen::VectorXd::Constant(
         1, both.residual(WheelRows::speed) + 0.5 * moved.odometer.track_width * both.residual(WheelRows::yaw_rate));
@@ -127,7 +128,7 @@ TEST_CASE("wheels: Jacobians of every model are the derivatives") {
       const auto prediction = [&](const Eigen::VectorXd& part) -> Eigen::VectorXd {
         Eigen::VectorXd d = Eigen::VectorXd::Zero(x.error_size());
         d.head(part.size()) = part;
-        return -rows_of(boxplus(x, d), turn, gyro_B, model, normal_known).residual;
+        return -rows_of(with_error(x, d), turn, gyro_B, model, normal_known).residual;
       };
       // The attitude and the position do not appear, nor does the cameras' part.
       Eigen::MatrixXd H = Eigen::MatrixXd::Zero(WheelRows::size, err::camera);

@@ -9,6 +9,7 @@ using namespace ear;
 
 constexpr int kWidth = 96;
 constexpr int kHeight = 64;
+constexpr int kLongestStride = 127;  // that an odd frame may have
 
 Calibration calibration() {
   Calibration c;
@@ -76,7 +77,7 @@ class Vehicle {
 
   /// Blocks of grey levels drawn from the input; the right image is the left one, shifted.
   void add_frame(TimeNs t_ns) {
-    pixels_.assign(static_cast<std::size_t>(kWidth * kHeight), 0);
+    pixels_.assign(static_cast<std::size_t>(kLongestStride * kHeight), 0);
     std::uint32_t noise = bytes_.take<std::uint32_t>();
     for (std::size_t i = 0; i < pixels_.size(); ++i) {
       if (i % 4 == 0 && (i / kWidth) % 4 == 0) noise = noise * 1664525U + 1013904223U;
@@ -87,8 +88,8 @@ class Vehicle {
     frame.t_ns = t_ns;
     frame.left = {pixels_.data(), kWidth, kHeight, kWidth};
     if (odd % 2 == 0) frame.right = frame.left;
-    if (odd == 255) frame.left.width = bytes_.take<std::uint8_t>() - 128;
-    if (odd == 253) frame.right = {pixels_.data(), kWidth, kHeight, bytes_.take<std::uint8_t>() - 128};
+    if (odd == 255) frame.left.width = bytes_.take<std::int8_t>();
+    if (odd == 253) frame.right = {pixels_.data(), kWidth, kHeight, bytes_.take<std::int8_t>()};
     if (const auto estimate = odometry_.add_stereo(frame)) fuzz::check(*estimate);
   }
 

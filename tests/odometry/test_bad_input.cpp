@@ -211,3 +211,20 @@ TEST_CASE("bad input: images that do not fit, or have no pixels, are refused and
   CHECK(odometry.input_counts().camera.implausible == 4);
   CHECK(odometry.input_counts().camera.accepted == 0);
 }
+
+TEST_CASE("bad input: a clock that jumps before any sample was accepted is no fault of those that come later") {
+  Filter filter(FilterConfig{}, drive().calibration());
+  TimeNs t_ns = kHour;
+  const auto add = [&](int count, TimeNs jump_ns, double rate) {
+    for (int i = 0; i < count; ++i, t_ns += 5'000'000) {
+      filter.add_imu({t_ns + jump_ns, {rate, 0.0, 0.0}, {0.0, 0.0, 9.81}});
+      filter.add_encoder({t_ns, 0, 0});
+    }
+  };
+  add(400, 0, kNaN);
+  add(100, 200'000'000, kNaN);
+  CHECK(filter.input_counts().clock_jumps == 1);
+  add(100, 200'000'000, 0.0);
+  filter.process(FeatureFrame{filter.camera_time(t_ns - 5'000'000), {}});
+  CHECK_FALSE(filter.health().faulty[index_of(Source::gyroscope)]);
+}

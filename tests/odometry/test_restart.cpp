@@ -3,6 +3,7 @@
 #include <doctest/doctest.h>
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -131,6 +132,18 @@ TEST_CASE("restart: rolling, after inertial samples were missing for long") {
   const Restart restart = check_restart(steps);
   check_continued(simulation, restart, steps.back());
   CHECK(restart.first->t < 11.5);
+}
+
+TEST_CASE("restart: the window stays as small as it was set") {
+  constexpr int clones = 4;
+  const std::vector<Step> steps = run(simulate("flat1"), silence(6.0, 9.0), [&](double t, Filter& filter) {
+    if (t < 1.0) filter.set_window(clones);
+  });
+  int most = 0;
+  for (const Step& step : steps) {
+    if (step.estimate && step.health.reset_counter == 1) most = std::max(most, step.estimate->frame.clones);
+  }
+  CHECK(most == clones);
 }
 
 TEST_CASE("restart: rolling, after all clocks were set back") {

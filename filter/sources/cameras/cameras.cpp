@@ -5,16 +5,13 @@
 
 #include "filter/ekf/initial_state.h"
 #include "filter/ekf/relative_motion.h"
-#include "filter/ingest/capacity.h"
-#include "filter/ingest/evidence.h"
-#include "filter/ingest/silence.h"
+#include "filter/ingest/limits.h"
 
 namespace ear {
 namespace {
 
 constexpr double kBridgePosition = 5e-3;  // [m] chosen, as kSeenTurn: well above what the features will show later
 constexpr double kComparedStep = 1e-4;    // [rad, m] chosen: a tenth of what two images show
-constexpr double kNoisy = 1.25;           // chosen: times the usual noise of a feature; less may be chance
 
 }  // namespace
 
@@ -23,9 +20,9 @@ Cameras::Cameras(const FilterConfig& config, const Calibration& calibration)
       count_(calibration.cameras.size()),
       focal_px_(focal_length(calibration)),
       tracks_(2 * kFeatureCapacity, static_cast<std::size_t>(config.window) + 1),
-      track_update_(config, focal_px_, count_),
+      track_update_(config, focal_px_),
       window_(config, focal_px_),
-      frame_check_(config.feature_sigma_px / focal_px_, Gate(config.gate_probability, 2)),
+      frame_check_(config.feature_sigma_px, focal_px_),
       rows_(6, err::clone(config.window + 1)) {
   last_features_.features.reserve(kFeatureCapacity);
   compared_.before.features.reserve(kFeatureCapacity);
@@ -34,10 +31,7 @@ Cameras::Cameras(const FilterConfig& config, const Calibration& calibration)
 void Cameras::measure_noise(const FeatureFrame& frame, const CameraState& cameras) {
   compared_.matched_ns.reset();
   compared_.seen.reset();
-  noise_ = 1.0;
-  if (count_ < 2) return;
-  const double ratio = image_noise_.measure(frame, cameras) * focal_px_ / config_.feature_sigma_px;
-  if (ratio > kNoisy) noise_ = ratio;
+  if (count_ > 1) frame_check_.measure_noise(frame, cameras);
 }
 
 Displacement Cameras::displacement(const FeatureFrame& frame, TimeNs t_ns, const ImuMotion& motion, const Ekf& ekf) {
@@ -45,13 +39,11 @@ Displacement Cameras::displacement(const FeatureFrame& frame, TimeNs t_ns, const
   if (ekf.state().imu.t_ns == compared_.t_ns) {  // else the frame before was not where the state is
     const std::vector<StereoMatch>& matches = matches_.find(compared_.before, frame, ekf.state().camera);
     compared_.matched_ns = compared_.before.t_ns;
-    StereoMotion start;
-    start.R_B0B1 = motion.R_BiBj;
-    start.p_B0B1 = motion.p_BiBj;
-    compared_.seen = stereo_motion(matches, ekf.state().camera, start, feature_sigma(), kComparedStep, config_.kernels);
+    compared_.seen =
+        stereo_motion(matches, ekf.state().camera, motion.T_BiBj, frame_check_.sigma(), kComparedStep, config_.kernels);
     result.available = compared_.seen.has_value();
     result.contradictory = !compared_.seen && matches.size() >= kFewFeatures;
-    if (compared_.seen) result.p_BiBj = compared_.seen->p_B0B1;
+    if (compared_.seen) result.p_BiBj = compared_.seen->T_B0B1.p;
     if (compared_.seen) result.covariance = compared_.seen->p_covariance();
   }
   compared_.t_ns = t_ns;
@@ -64,8 +56,7 @@ Pose Cameras::image_pose(const State& x) const {
   const auto clone =
       std::find_if(x.clones.begin(), x.clones.end(), [this](const Clone& c) { return c.frame == *last_->clone; });
   if (clone == x.clones.end()) return last_->T_WB;  // it was marginalised
-  const Pose& T_WB = clone->T_WB;
-  return {T_WB.R * last_->in_clone.R, T_WB.R * last_->in_clone.p + T_WB.p};
+  return clone->T_WB * last_->in_clone;
 }
 
 /// The body now, in the body at the last image.
@@ -84,27 +75,22 @@ const std::vector<StereoMatch>& Cameras::matches_with(const FeatureFrame& frame,
 bool Cameras::bridge(const FeatureFrame& frame, Ekf& ekf) {
   const State& x = ekf.state();
   if (!last_ || count_ < 2 || x.clones.empty()) return false;
-  const Pose moved = motion_since_image(x);
-  StereoMotion start;
-  start.R_B0B1 = moved.R;
-  start.p_B0B1 = moved.p;
   const std::optional<StereoMotion> motion =
-      stereo_motion(matches_with(frame, x.camera), x.camera, start, feature_sigma());
+      stereo_motion(matches_with(frame, x.camera), x.camera, motion_since_image(x), frame_check_.sigma());
   if (!motion) return false;
-  const int newest = static_cast<int>(x.clones.size()) - 1;
-  const RelativeMotionRows rows = linearize_relative_motion(x, newest, {motion->R_B0B1, motion->p_B0B1});
   const Eigen::Matrix3d R_WB0 = x.clones.back().T_WB.R;
   const Eigen::Matrix3d covariance = R_WB0 * motion->p_covariance() * R_WB0.transpose() +
                                      kBridgePosition * kBridgePosition * Eigen::Matrix3d::Identity();
   const Eigen::LLT<Eigen::Matrix3d> llt(covariance);
-  auto H = rows_.topLeftCorner(6, err::clone(newest) + err::clone_size);
-  H.setZero();
-  H.topLeftCorner<3, err::imu_size>() = rows.H.topRows<3>() / kSeenTurn;
-  H.topRightCorner<3, err::clone_size>() = rows.H_clone.topRows<3>() / kSeenTurn;
-  H.bottomLeftCorner<3, err::imu_size>() = llt.matrixL().solve(rows.H.bottomRows<3>());
-  H.bottomRightCorner<3, err::clone_size>() = llt.matrixL().solve(rows.H_clone.bottomRows<3>());
+  auto H = rows_.topLeftCorner(6, x.error_size());
   Eigen::Matrix<double, 6, 1> r;
-  r << rows.residual.head<3>() / kSeenTurn, llt.matrixL().solve(rows.residual.tail<3>());
+  linearize_relative_motion(x, motion->T_B0B1, H, r);
+  H.topRows<3>() /= kSeenTurn;
+  r.head<3>() /= kSeenTurn;
+  auto H_position = H.bottomRows<3>();
+  auto r_position = r.tail<3>();
+  llt.matrixL().solveInPlace(H_position);
+  llt.matrixL().solveInPlace(r_position);
   ekf.apply(H, 0, r, CameraUpdate::considered);
   return true;
 }
@@ -116,29 +102,28 @@ FrameAgreement Cameras::compare(const FeatureFrame& frame, const Ekf& ekf) {
   const State& x = ekf.state();
   const double dt = last_ ? seconds_between(last_->t_ns, frame.t_ns) : 0.0;
   if (last_ && dt <= kStale) {
-    const Pose moved = motion_since_image(x);
     const double sigma_v = std::sqrt(ekf.covariance().matrix().diagonal().segment<3>(err::nu).maxCoeff());
-    const double sigma_p = dt * sigma_v;
-    agreement = frame_check_.compare(matches_with(frame, x.camera), {moved.R, moved.p, sigma_p}, x.camera, noise_);
+    agreement =
+        frame_check_.compare(matches_with(frame, x.camera), motion_since_image(x), dt * sigma_v, x.camera, ekf.gate());
     compared_.agrees = !agreement.contradicts();
   }
-  agreement.noise = noise_;
-  agreement.behind = frame_check_.share_behind(frame, x.camera, noise_);
+  agreement.noise = frame_check_.noise();
+  agreement.behind = frame_check_.share_behind(frame, x.camera);
   return agreement;
 }
 
 void Cameras::update(const FeatureFrame& frame, double weight, CameraUpdate calibration, Ekf& ekf, Records& records) {
-  ekf.clone(noise_ / weight);
+  ekf.clone(frame_check_.noise() / weight);
   tracks_.add(ekf.state().clones.back().frame, frame.features);
   const std::optional<std::size_t> next = window_.to_marginalise(ekf.state(), tracks_);
-  track_update_.update(frame, next && *next == 0, calibration, tracks_, ekf, records);
+  track_update_.update(next && *next == 0, calibration, tracks_, ekf, records);
   window_.add_updates(records.statistics.features_used, ekf.state().imu.t_ns);
   marginalise(next, ekf);
   while (ekf.state().clones.size() > window_.size()) marginalise(0, ekf);  // the window has become smaller
 }
 
 void Cameras::clone_without_image(double weight, Ekf& ekf) {
-  ekf.clone(noise_ / weight);
+  ekf.clone(frame_check_.noise() / weight);
   marginalise(window_.to_marginalise(ekf.state(), tracks_), ekf);
 }
 
@@ -151,7 +136,7 @@ void Cameras::marginalise(std::optional<std::size_t> clone, Ekf& ekf) {
 
 void Cameras::remember(const FeatureFrame& frame, const Ekf& ekf) {
   const State& x = ekf.state();
-  last_ = LastImage{frame.t_ns, {x.imu.R_WB, x.imu.p_WB}, std::nullopt, {}};
+  last_ = LastImage{frame.t_ns, x.imu.T_WB(), std::nullopt, {}};
   last_features_ = frame;
   if (x.clones.empty()) return;
   const Clone& clone = x.clones.back();

@@ -1,5 +1,5 @@
 // The cameras as a source: the features of a frame are checked, become a clone with tracks, and tracks that end update
-// the filter. docs/filter.md, "Features", "Window", "Images that show nothing".
+// the filter. docs/filter.md, "Features", "Window", "Poor light".
 #pragma once
 
 #include <optional>
@@ -11,7 +11,6 @@
 #include "filter/ekf/imu_displacement.h"
 #include "filter/ekf/records.h"
 #include "filter/sources/cameras/frame_check.h"
-#include "filter/sources/cameras/image_noise.h"
 #include "filter/sources/cameras/stereo_motion.h"
 #include "filter/sources/cameras/track_update.h"
 #include "filter/sources/cameras/tracks.h"
@@ -34,8 +33,9 @@ class Cameras {
   [[nodiscard]] std::size_t count() const { return count_; }
   /// Keeps no more than so many clones from the next frame on.
   void set_window(int clones) { window_.set_size(clones); }
+  [[nodiscard]] int window() const { return static_cast<int>(window_.size()); }
 
-  /// A new frame: how exact are its features? Kept for all that is done with it.
+  /// A new frame: how exact are its features? For all that is done with it.
   void measure_noise(const FeatureFrame& frame, const CameraState& cameras);
   /// p^c of (13). `motion`: by the inertial samples, from where the state is to the frame at `t_ns` (IMU time).
   [[nodiscard]] Displacement displacement(const FeatureFrame& frame, TimeNs t_ns, const ImuMotion& motion,
@@ -83,8 +83,6 @@ class Cameras {
     bool agrees = true;                ///< most features were where the state expected them
   };
 
-  /// Of one observation in the newest frame, normalized.
-  [[nodiscard]] double feature_sigma() const { return noise_ * config_.feature_sigma_px / focal_px_; }
   [[nodiscard]] Pose motion_since_image(const State& x) const;
   /// Of the last image that was used with the frame at hand.
   const std::vector<StereoMatch>& matches_with(const FeatureFrame& frame, const CameraState& cameras);
@@ -96,8 +94,6 @@ class Cameras {
   TrackTable tracks_;
   TrackUpdate track_update_;
   WindowRule window_;
-  ImageNoise image_noise_;
-  double noise_ = 1.0;  ///< standard deviation of the features of the frame at hand, times the usual
   FrameCheck frame_check_;
   StereoMatches matches_;
   Compared compared_;

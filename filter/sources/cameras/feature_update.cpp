@@ -1,10 +1,11 @@
 #include "filter/sources/cameras/feature_update.h"
 
 #include <Eigen/Cholesky>
-#include <algorithm>
 #include <cassert>
 #include <cmath>
 #include <limits>
+
+#include "filter/ekf/kernel_matrix.h"
 
 namespace ear {
 namespace {
@@ -13,9 +14,6 @@ namespace {
 /// acts through the clones.
 constexpr int clone_column(int clone) { return err::clone(clone) - err::camera; }
 constexpr int lens_column(int camera) { return err::lens(camera) - err::camera; }
-
-ConstMatrix readable(const Eigen::MatrixXd& M) { return {M.data(), M.outerStride()}; }
-MutableMatrix writable(Eigen::MatrixXd& M) { return {M.data(), M.outerStride()}; }
 
 /// The rows of which A = H^T H and b = H^T r are the sums: Cholesky with diagonal pivoting, row by row. A, of which
 /// only the lower triangle is read, is singular (yaw and position are free, calibration is seen in part). The largest
@@ -30,20 +28,19 @@ void rows_from_sums(const FilterKernels& kernels, const Eigen::MatrixXd& A, int 
   scale.segment(size, beyond).setOnes();
   rows.count = kernels.pivoted_rows(readable(A), size, b.data(), pivots.data(), scale.data(), negligible,
                                     writable(rows.H_transposed), rows.r.data());
-  rows.H.topLeftCorner(rows.count, size) = rows.H_transposed.topLeftCorner(size, rows.count).transpose();
 }
 
 }  // namespace
 
 void camera_poses(const State& x, std::vector<CameraPose>& poses) {
   const Pose& T_BC0 = x.camera.T_BC0;
-  const Eigen::Matrix3d R_BC1 = T_BC0.R * x.camera.T_C0C1.R;
-  const Eigen::Vector3d p_BC1 = T_BC0.R * x.camera.T_C0C1.p + T_BC0.p;
+  const Pose T_BC1 = T_BC0 * x.camera.T_C0C1;
   poses.resize(2 * x.clones.size());
   for (std::size_t i = 0; i < x.clones.size(); ++i) {
-    const Pose& T_WB = x.clones[i].T_WB;
-    poses[2 * i] = {(T_WB.R * T_BC0.R).transpose(), T_WB.p + T_WB.R * T_BC0.p};
-    poses[2 * i + 1] = {(T_WB.R * R_BC1).transpose(), T_WB.p + T_WB.R * p_BC1};
+    const Pose T_WC0 = x.clones[i].T_WB * T_BC0;
+    const Pose T_WC1 = x.clones[i].T_WB * T_BC1;
+    poses[2 * i] = {T_WC0.R.transpose(), T_WC0.p};
+    poses[2 * i + 1] = {T_WC1.R.transpose(), T_WC1.p};
   }
 }
 
@@ -101,7 +98,7 @@ FeatureInformation::FeatureInformation(int max_clones, int max_features, Kernels
     : kernels_(filter_kernels(kernels)) {
   const int size = err::clone(max_clones) - err::camera;
   for (Eigen::MatrixXd* const matrix :
-       {&A_, &gate_A_, &gate_PHt_, &rows_.H, &rows_.H_transposed, &gate_rows_.H, &gate_rows_.H_transposed}) {
+       {&A_, &gate_A_, &gate_PHt_, &H_, &rows_.H_transposed, &gate_rows_.H_transposed}) {
     matrix->setZero(stride_for(size), rounded_up(size));
   }
   for (Eigen::VectorXd* const vector : {&b_, &gate_b_, &scale_, &pivots_, &rows_.r, &gate_rows_.r}) {
@@ -157,8 +154,7 @@ bool FeatureInformation::add(const std::vector<LinearizedObservation>& observati
 
   // With P = 0 the statistic is largest: who passes then passes anyway, and the full test is not needed.
   const double residual_cost = cost - Lv.squaredNorm();
-  if (!gate.fits_distance(residual_cost, dof) &&
-      !gate.fits_distance(chi_squared(observations, Lv, P, residual_cost), dof)) {
+  if (!gate.fits(residual_cost, 1.0, dof) && !gate.fits(chi_squared(observations, Lv, P, residual_cost), 1.0, dof)) {
     return false;
   }
   sum_up(observations, Lv, A_, b_);
@@ -220,6 +216,7 @@ void FeatureInformation::compress(double negligible) {
   scale_.head(size_) = A_.diagonal().head(size_);
   kernels_.subtract_square(readable(W_), 3 * features_, size_, writable(A_));
   rows_from_sums(kernels_, A_, size_, b_, pivots_, scale_, negligible, rows_);
+  H_.topLeftCorner(rows_.count, size_) = rows_.H_transposed.topLeftCorner(size_, rows_.count).transpose();
 }
 
 }  // namespace ear

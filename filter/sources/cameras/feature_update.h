@@ -45,7 +45,6 @@ void camera_poses(const State& x, std::vector<CameraPose>& poses);
 
 /// Linear measurement with unit covariance: residual r = H e + n, cov(n) = I. The first `count` rows are valid.
 struct WhitenedRows {
-  Eigen::MatrixXd H;
   Eigen::MatrixXd H_transposed;
   Eigen::VectorXd r;
   int count = 0;
@@ -73,7 +72,7 @@ class FeatureInformation {
   /// start(). `negligible`: the share of what the features show of a quantity, were they known themselves, that may
   /// be left out; smaller ones come last.
   void compress(double negligible = kRounding);
-  [[nodiscard]] Eigen::Ref<const Eigen::MatrixXd> H() const { return rows_.H.topLeftCorner(rows_.count, size_); }
+  [[nodiscard]] Eigen::Ref<const Eigen::MatrixXd> H() const { return H_.topLeftCorner(rows_.count, size_); }
   [[nodiscard]] Eigen::Ref<const Eigen::VectorXd> residual() const { return rows_.r.head(rows_.count); }
 
  private:
@@ -86,6 +85,7 @@ class FeatureInformation {
   int size_ = 0;      // columns: the camera's part of the error vector
   int features_ = 0;  // in W_
   WhitenedRows rows_;
+  Eigen::MatrixXd H_;      // of these rows
   Eigen::MatrixXd A_, W_;  // with rows beyond for the kernels; W_: H^T H_f V^-1/2 of each feature, 3 columns each
   Eigen::VectorXd b_, scale_, pivots_;
   std::vector<double> weights_;  // of its observations: Huber's, over the variance

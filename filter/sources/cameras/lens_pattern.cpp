@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "filter/ingest/evidence.h"
+#include "filter/ingest/limits.h"
 
 namespace ear {
 namespace {

@@ -7,8 +7,7 @@
 #include <cstddef>
 
 #include "filter/ekf/so3.h"
-#include "filter/ingest/capacity.h"
-#include "filter/ingest/evidence.h"
+#include "filter/ingest/limits.h"
 #include "filter/kernels/filter_kernels.h"
 #include "filter/sources/cameras/frame_agreement.h"
 #include "filter/sources/cameras/triangulation.h"
@@ -38,10 +37,10 @@ NormalEquations equations_of(const StereoSums& sums) {
   return equations;
 }
 
-PlainPose plain(const Eigen::Matrix3d& R, const Eigen::Vector3d& p) {
+PlainPose plain(const Pose& T) {
   PlainPose pose;
-  Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(pose.R) = R;
-  Eigen::Map<Eigen::Vector3d>(pose.p) = p;
+  Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(pose.R) = T.R;
+  Eigen::Map<Eigen::Vector3d>(pose.p) = T.p;
   return pose;
 }
 
@@ -56,14 +55,9 @@ StereoTable table_of(const std::vector<StereoMatch>& matches) {
 
 /// The s with which h = a + s b is best seen at `right`.
 double inverse_depth(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector2d& right) {
-  double numerator = 0.0;
-  double denominator = 0.0;
-  for (int k = 0; k < 2; ++k) {
-    const double slope = b(k) - right(k) * b.z();
-    numerator += (right(k) * a.z() - a(k)) * slope;
-    denominator += slope * slope;
-  }
-  return denominator > 0.0 ? numerator / denominator : 0.0;
+  InverseDepthSums sums;
+  sums.add(a, b, right);
+  return sums.inverse_depth(0.0);
 }
 
 class Problem {
@@ -73,27 +67,24 @@ class Problem {
         table_(table_of(matches)),
         sigma_(sigma),
         baseline_(cameras.T_C0C1.p.norm()) {
-    const Pose& T_BC0 = cameras.T_BC0;
-    T_BC_[0] = T_BC0;
-    T_BC_[1] = {T_BC0.R * cameras.T_C0C1.R, T_BC0.R * cameras.T_C0C1.p + T_BC0.p};
-    const Eigen::Matrix3d R_C1C0 = cameras.T_C0C1.R.transpose();
-    plain_.right0 = plain(R_C1C0, -(R_C1C0 * cameras.T_C0C1.p));
+    T_BC_ = {cameras.T_BC0, cameras.T_BC0 * cameras.T_C0C1};
+    plain_.right0 = plain(cameras.T_C0C1.inverse());
     plain_.huber = kHuber;
     plain_.fits = kClear;
     plain_.least_depth = kLeastDepth;
   }
 
   /// One step from `x`. `fitting`: how many features fit.
-  NormalEquations step(const StereoMotion& x, int& fitting) {
+  NormalEquations step(const Pose& T_B0B1, int& fitting) {
     // A depth's error moves the point in frame 1 by its parallax, which is in proportion to the motion.
-    const double share = std::sqrt(2.0) * x.p_B0B1.norm() / baseline_;
+    const double share = std::sqrt(2.0) * T_B0B1.p.norm() / baseline_;
     plain_.sigma = sigma_ * std::sqrt(1.0 + share * share);
     std::array<StereoSums, 2> camera_sums;
-    for (std::size_t k = 0; k < 2; ++k) plain_.frame1[k] = view_of(T_BC_[k], x);
+    for (std::size_t k = 0; k < 2; ++k) plain_.frame1[k] = view_of(T_BC_[k], T_B0B1);
     fitting = kernels_.add_stereo(table_, plain_, camera_sums.data());
     NormalEquations sums;
     for (std::size_t k = 0; k < 2; ++k) {
-      const Eigen::Matrix<double, 6, 6> J = camera_by_body(T_BC_[k], x);
+      const Eigen::Matrix<double, 6, 6> J = camera_by_body(T_BC_[k], T_B0B1);
       const NormalEquations camera = equations_of(camera_sums[k]);
       const Eigen::Matrix<double, 6, 6> AJ = camera.A.lazyProduct(J);
       sums.A += J.transpose().lazyProduct(AJ);
@@ -105,19 +96,19 @@ class Problem {
  private:
   /// A point of frame 0 with the ray x and the inverse depth s, both in the left camera, is at h = R x + s p in a
   /// camera of frame 1, times its inverse depth.
-  [[nodiscard]] PlainPose view_of(const Pose& T_BC, const StereoMotion& x) const {
-    const Eigen::Matrix3d R_CB0 = T_BC.R.transpose() * x.R_B0B1.transpose();
+  [[nodiscard]] PlainPose view_of(const Pose& T_BC, const Pose& T_B0B1) const {
+    const Eigen::Matrix3d R_CB0 = T_BC.R.transpose() * T_B0B1.R.transpose();
     const Pose& T_BC0 = T_BC_[0];
-    return plain(R_CB0 * T_BC0.R, R_CB0 * (T_BC0.p - x.p_B0B1) - T_BC.R.transpose() * T_BC.p);
+    return plain({R_CB0 * T_BC0.R, R_CB0 * (T_BC0.p - T_B0B1.p) - T_BC.R.transpose() * T_BC.p});
   }
 
   /// (theta, tau) in a camera by the turn of R_B0B1 and the shift of p_B0B1.
-  static Eigen::Matrix<double, 6, 6> camera_by_body(const Pose& T_BC, const StereoMotion& x) {
+  static Eigen::Matrix<double, 6, 6> camera_by_body(const Pose& T_BC, const Pose& T_B0B1) {
     const Eigen::Matrix3d R_CB = T_BC.R.transpose();
     Eigen::Matrix<double, 6, 6> J = Eigen::Matrix<double, 6, 6>::Zero();
     J.topLeftCorner<3, 3>() = R_CB;
     J.bottomLeftCorner<3, 3>() = -R_CB * skew(T_BC.p);
-    J.bottomRightCorner<3, 3>() = R_CB * x.R_B0B1.transpose();
+    J.bottomRightCorner<3, 3>() = R_CB * T_B0B1.R.transpose();
     return J;
   }
 
@@ -139,8 +130,7 @@ StereoMatches::StereoMatches() {
 const std::vector<StereoMatch>& StereoMatches::find(const FeatureFrame& from, const FeatureFrame& to,
                                                     const CameraState& cameras) {
   const auto& [left, right] = cameras.lens_error;
-  const Eigen::Matrix3d R_C1C0 = cameras.T_C0C1.R.transpose();
-  const Eigen::Vector3d b = -(R_C1C0 * cameras.T_C0C1.p);
+  const Pose T_C1C0 = cameras.T_C0C1.inverse();
   earlier_.clear();
   matches_.clear();
   for (const FeatureObservation& feature : from.features) {
@@ -154,8 +144,8 @@ const std::vector<StereoMatch>& StereoMatches::find(const FeatureFrame& from, co
     const FeatureObservation& before = **found;
     StereoMatch match{left.corrected(before.left), right.corrected(before.right), left.corrected(now.left),
                       right.corrected(now.right), now.has_right};
-    const Eigen::Vector3d a = R_C1C0 * match.left0.homogeneous();
-    const Eigen::Vector3d h = a + inverse_depth(a, b, match.right0) * b;
+    const Eigen::Vector3d a = T_C1C0.R * match.left0.homogeneous();
+    const Eigen::Vector3d h = a + inverse_depth(a, T_C1C0.p, match.right0) * T_C1C0.p;
     if (h.z() >= kLeastDepth) {
       const Eigen::Vector2d fitting = h.hnormalized();
       match.right1 -= match.right0 - fitting;
@@ -167,23 +157,24 @@ const std::vector<StereoMatch>& StereoMatches::find(const FeatureFrame& from, co
 }
 
 double stereo_inverse_depth(const CameraState& cameras, const Eigen::Vector2d& left, const Eigen::Vector2d& right) {
-  const Eigen::Matrix3d R_C1C0 = cameras.T_C0C1.R.transpose();
-  return inverse_depth(R_C1C0 * left.homogeneous(), -(R_C1C0 * cameras.T_C0C1.p), right);
+  const Pose T_C1C0 = cameras.T_C0C1.inverse();
+  return inverse_depth(T_C1C0.R * left.homogeneous(), T_C1C0.p, right);
 }
 
 std::optional<StereoMotion> stereo_motion(const std::vector<StereoMatch>& matches, const CameraState& cameras,
-                                          const StereoMotion& start, double sigma, double settled, Kernels kernels) {
-  StereoMotion motion = start;
+                                          const Pose& start, double sigma, double settled, Kernels kernels) {
+  StereoMotion motion;
+  motion.T_B0B1 = start;
   motion.matches = static_cast<int>(matches.size());
   if (motion.matches < kFewFeatures) return std::nullopt;
   Problem problem(matches, cameras, sigma, kernels);
   for (int iteration = 0; iteration < kIterations; ++iteration) {
-    const NormalEquations sums = problem.step(motion, motion.fitting);
+    const NormalEquations sums = problem.step(motion.T_B0B1, motion.fitting);
     const Eigen::LDLT<Eigen::Matrix<double, 6, 6>> ldlt(sums.A);
     const Eigen::Matrix<double, 6, 1> step = ldlt.solve(sums.b);
     if (ldlt.info() != Eigen::Success || !step.allFinite()) return std::nullopt;
-    motion.R_B0B1 = motion.R_B0B1 * exp_so3(step.head<3>());
-    motion.p_B0B1 += step.tail<3>();
+    motion.T_B0B1.R = motion.T_B0B1.R * exp_so3(step.head<3>());
+    motion.T_B0B1.p += step.tail<3>();
     motion.covariance = ldlt.solve(Eigen::Matrix<double, 6, 6>::Identity());
     if (step.norm() < settled) break;
   }
@@ -192,12 +183,11 @@ std::optional<StereoMotion> stereo_motion(const std::vector<StereoMatch>& matche
   return motion;
 }
 
-ExcessTurn turn_beyond(const StereoMotion& seen, const Eigen::Matrix3d& R_B0B1, const Eigen::Vector3d& p_B0B1,
-                       const Eigen::Matrix3d& p_covariance) {
+ExcessTurn turn_beyond(const StereoMotion& seen, const Pose& T_B0B1, const Eigen::Matrix3d& p_covariance) {
   const Eigen::Matrix3d by_p = seen.covariance.topRightCorner<3, 3>();
   const Eigen::LDLT<Eigen::Matrix3d> p_ldlt(seen.p_covariance() + p_covariance);
   const Eigen::Matrix3d gain = p_ldlt.solve(by_p.transpose()).transpose();
-  return {log_so3(R_B0B1.transpose() * seen.R_B0B1) - gain * (seen.p_B0B1 - p_B0B1),
+  return {log_so3(T_B0B1.R.transpose() * seen.T_B0B1.R) - gain * (seen.T_B0B1.p - T_B0B1.p),
           seen.covariance.topLeftCorner<3, 3>() - gain * by_p.transpose()};
 }
 

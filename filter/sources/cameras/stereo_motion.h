@@ -45,8 +45,7 @@ inline constexpr double kSeenTurn = 2e-3;
 
 /// The motion from frame 0 to frame 1.
 struct StereoMotion {
-  Eigen::Matrix3d R_B0B1 = Eigen::Matrix3d::Identity();
-  Eigen::Vector3d p_B0B1 = Eigen::Vector3d::Zero();  ///< [m]
+  Pose T_B0B1;
   /// Of a turn in B1 [rad], and of p_B0B1 [m].
   Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Identity();
   int matches = 0;
@@ -62,16 +61,14 @@ struct ExcessTurn {
 };
 /// What the images show of the turn if the displacement is as predicted, to within `p_covariance`. Alone, a fit takes
 /// some of the displacement for a turn, since the depths are noisy.
-[[nodiscard]] ExcessTurn turn_beyond(const StereoMotion& seen, const Eigen::Matrix3d& R_B0B1,
-                                     const Eigen::Vector3d& p_B0B1, const Eigen::Matrix3d& p_covariance);
+[[nodiscard]] ExcessTurn turn_beyond(const StereoMotion& seen, const Pose& T_B0B1, const Eigen::Matrix3d& p_covariance);
 
 /// Least squares over rotation and translation: the points seen in frame 0, projected into both cameras of frame 1.
 /// Observations further off than `huber` standard deviations weigh less. `sigma`: one observation, normalized; `start`:
 /// where to begin, `settled` [rad, m]: steps with which it ends. Nothing if the points do not show it, or most of them
 /// do not move as one body.
 [[nodiscard]] std::optional<StereoMotion> stereo_motion(const std::vector<StereoMatch>& matches,
-                                                        const CameraState& cameras, const StereoMotion& start,
-                                                        double sigma, double settled = 1e-8,
-                                                        Kernels kernels = Kernels::best);
+                                                        const CameraState& cameras, const Pose& start, double sigma,
+                                                        double settled = 1e-8, Kernels kernels = Kernels::best);
 
 }  // namespace ear

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "filter/ingest/capacity.h"
+#include "filter/ingest/limits.h"
 
 namespace ear {
 namespace {
@@ -16,25 +16,33 @@ int clone_index(const State& x, std::uint64_t frame) {
   return static_cast<int>(clone - x.clones.begin());
 }
 
+/// Does the newest clone see the feature?
+bool continues(const Track& track, const State& x) { return track.observations.back().frame == x.clones.back().frame; }
+
+/// Calls see(clone, camera, where) for each place in an image where the feature was seen.
+template <typename Function>
+void for_each_view(const Track& track, const State& x, const Function& see) {
+  for (const TrackObservation& o : track.observations) {
+    const int clone = clone_index(x, o.frame);
+    see(clone, 0, o.left);
+    if (o.has_right) see(clone, 1, o.right);
+  }
+}
+
 }  // namespace
 
-TrackUpdate::TrackUpdate(const FilterConfig& config, double focal_px, std::size_t cameras)
-    : config_(config),
-      focal_px_(focal_px),
-      camera_count_(cameras),
-      information_(config.window + 1, config.max_track_updates, config.kernels) {
+TrackUpdate::TrackUpdate(const FilterConfig& config, double focal_px)
+    : config_(config), focal_px_(focal_px), information_(config.window + 1, config.max_track_updates, config.kernels) {
   const auto clones = static_cast<std::size_t>(config.window) + 1;
   cameras_.reserve(2 * clones);
   sightings_.reserve(2 * clones);
   observations_.reserve(2 * clones);
   selected_.reserve(2 * kFeatureCapacity);
-  frame_ids_.reserve(kFeatureCapacity);
 }
 
-void TrackUpdate::update(const FeatureFrame& frame, bool oldest_goes, CameraUpdate calibration, TrackTable& tracks,
-                         Ekf& ekf, Records& records) {
+void TrackUpdate::update(bool oldest_goes, CameraUpdate calibration, TrackTable& tracks, Ekf& ekf, Records& records) {
   const State& x = ekf.state();
-  select(frame, oldest_goes ? std::optional(x.clones.front().frame) : std::nullopt, tracks);
+  select(x, oldest_goes, tracks);
   information_.start(x.error_size());
   residuals_ = {};
   camera_poses(x, cameras_);
@@ -52,20 +60,17 @@ void TrackUpdate::update(const FeatureFrame& frame, bool oldest_goes, CameraUpda
     ekf.apply(information_.H(), err::camera, information_.residual(), calibration);
   }
   // Features that ended, used or not, are forgotten.
-  tracks.keep_if([&](const Track& track) { return !track.observations.empty() && continues(track.id); });
+  tracks.keep_if([&](const Track& track) { return !track.observations.empty() && continues(track, x); });
 }
 
 /// The longest first.
-void TrackUpdate::select(const FeatureFrame& frame, std::optional<std::uint64_t> oldest, const TrackTable& tracks) {
-  frame_ids_.clear();
-  for (const FeatureObservation& feature : frame.features) frame_ids_.push_back(feature.id);
-  std::sort(frame_ids_.begin(), frame_ids_.end());
+void TrackUpdate::select(const State& x, bool oldest_goes, const TrackTable& tracks) {
   selected_.clear();
   for (std::size_t i = 0; i < tracks.size(); ++i) {
     const Track& track = tracks[i];
     if (track.observations.size() < kMinObservations) continue;
-    const bool fills_window = oldest && track.observations.front().frame == *oldest;
-    if (!continues(track.id) || fills_window) selected_.push_back(i);
+    const bool fills_window = oldest_goes && track.observations.front().frame == x.clones.front().frame;
+    if (!continues(track, x) || fills_window) selected_.push_back(i);
   }
   const auto longer = [&](std::size_t a, std::size_t b) {
     const std::size_t observations_a = tracks[a].observations.size();
@@ -77,31 +82,21 @@ void TrackUpdate::select(const FeatureFrame& frame, std::optional<std::uint64_t>
   if (selected_.size() > limit) selected_.resize(limit);
 }
 
-bool TrackUpdate::continues(std::uint64_t id) const {
-  return std::binary_search(frame_ids_.begin(), frame_ids_.end(), id);
-}
-
 bool TrackUpdate::add(const Track& track, const Ekf& ekf) {
   const State& x = ekf.state();
   sightings_.clear();
-  const auto see = [&](int clone, int which, const Eigen::Vector2d& uv) {
-    const CameraPose& camera = cameras_[static_cast<std::size_t>(2 * clone + which)];
-    sightings_.push_back(
-        {camera.R_CW, camera.p_WC, x.camera.lens_error[static_cast<std::size_t>(which)].corrected(uv)});
-  };
-  for (const TrackObservation& o : track.observations) {
-    const int clone = clone_index(x, o.frame);
-    see(clone, 0, o.left);
-    if (o.has_right) see(clone, 1, o.right);
-  }
+  for_each_view(track, x, [&](int clone, std::size_t camera, const Eigen::Vector2d& uv) {
+    const CameraPose& pose = cameras_[2 * static_cast<std::size_t>(clone) + camera];
+    sightings_.push_back({pose.R_CW, pose.p_WC, x.camera.lens_error[camera].corrected(uv)});
+  });
   const std::optional<InverseDepthPoint> point = triangulate(sightings_);
   if (!point) return false;
   observations_.clear();
-  for (const TrackObservation& o : track.observations) {
-    const int clone = clone_index(x, o.frame);
-    add_observation(x, clone, 0, *point, o.left);
-    if (o.has_right) add_observation(x, clone, 1, *point, o.right);
-  }
+  for_each_view(track, x, [&](int clone, std::size_t camera, const Eigen::Vector2d& uv) {
+    observations_.push_back(linearize_observation(x, clone, static_cast<int>(camera), *point, uv));
+    residuals_[camera].squares_px2 += focal_px_ * focal_px_ * observations_.back().residual.squaredNorm();
+    residuals_[camera].count += 2;
+  });
   return information_.add(observations_, config_.feature_sigma_px / focal_px_,
                           config_.huber_px / config_.feature_sigma_px, ekf.covariance().matrix(), ekf.gate());
 }
@@ -113,16 +108,9 @@ void TrackUpdate::add_to_pattern(const Track& track, const CameraState& cameras)
   if (newest != seen.rend()) lens_pattern_.add(newest->left, newest->right, cameras);
 }
 
-void TrackUpdate::add_observation(const State& x, int clone, std::size_t camera, const InverseDepthPoint& point,
-                                  const Eigen::Vector2d& uv) {
-  observations_.push_back(linearize_observation(x, clone, static_cast<int>(camera), point, uv));
-  residuals_[camera].squares_px2 += focal_px_ * focal_px_ * observations_.back().residual.squaredNorm();
-  residuals_[camera].count += 2;
-}
-
 /// What both cameras saw of this frame's features, against where they were found to be.
 void TrackUpdate::log(const Ekf& ekf, Records& records) const {
-  for (std::size_t camera = 0; camera < camera_count_; ++camera) {
+  for (std::size_t camera = 0; camera < residuals_.size(); ++camera) {
     const Residuals& seen = residuals_[camera];
     if (seen.count == 0) continue;
     Innovation typical;  // [px]

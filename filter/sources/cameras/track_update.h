@@ -3,8 +3,6 @@
 #pragma once
 
 #include <array>
-#include <cstdint>
-#include <optional>
 #include <vector>
 
 #include "ear/filter_config.h"
@@ -18,24 +16,20 @@ namespace ear {
 
 class TrackUpdate {
  public:
-  /// `focal_px`: pixels per unit of normalized image coordinates. `cameras`: 1 or 2.
-  TrackUpdate(const FilterConfig& config, double focal_px, std::size_t cameras);
+  /// `focal_px`: pixels per unit of normalized image coordinates.
+  TrackUpdate(const FilterConfig& config, double focal_px);
 
-  /// Updates the state with the tracks that do not go on in `frame`, and with those that reach back to the oldest clone
-  /// if that is marginalised next. Their observations are used up.
-  void update(const FeatureFrame& frame, bool oldest_goes, CameraUpdate calibration, TrackTable& tracks, Ekf& ekf,
-              Records& records);
+  /// Updates the state with the tracks that do not go on to the newest clone, and with those that reach back to the
+  /// oldest one if that is marginalised next. Their observations are used up.
+  void update(bool oldest_goes, CameraUpdate calibration, TrackTable& tracks, Ekf& ekf, Records& records);
 
   [[nodiscard]] const LensPattern& lens_pattern() const { return lens_pattern_; }
   void reset() { lens_pattern_.reset(); }
 
  private:
-  void select(const FeatureFrame& frame, std::optional<std::uint64_t> oldest, const TrackTable& tracks);
-  [[nodiscard]] bool continues(std::uint64_t id) const;
+  void select(const State& x, bool oldest_goes, const TrackTable& tracks);
   bool add(const Track& track, const Ekf& ekf);
   void add_to_pattern(const Track& track, const CameraState& cameras);
-  void add_observation(const State& x, int clone, std::size_t camera, const InverseDepthPoint& point,
-                       const Eigen::Vector2d& uv);
   void log(const Ekf& ekf, Records& records) const;
 
   /// Of this frame's features, in one camera.
@@ -46,7 +40,6 @@ class TrackUpdate {
 
   FilterConfig config_;
   double focal_px_;
-  std::size_t camera_count_;
   std::array<Residuals, 2> residuals_;
   LensPattern lens_pattern_;
   // Memory that is used again.
@@ -55,7 +48,6 @@ class TrackUpdate {
   std::vector<Sighting> sightings_;
   std::vector<LinearizedObservation> observations_;
   std::vector<std::size_t> selected_;
-  std::vector<std::uint64_t> frame_ids_;  ///< of the frame at hand, ascending
 };
 
 }  // namespace ear

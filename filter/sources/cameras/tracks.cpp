@@ -1,10 +1,16 @@
 #include "filter/sources/cameras/tracks.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
+#include <limits>
+
+#include "filter/ingest/median.h"
+#include "filter/sources/cameras/frame_agreement.h"
 
 namespace ear {
 
 TrackTable::TrackTable(std::size_t tracks, std::size_t observations) : tracks_(tracks) {
+  parallax_.reserve(tracks);
   for (Track& track : tracks_) track.observations.reserve(observations);
 }
 
@@ -38,6 +44,28 @@ void TrackTable::forget_frame(std::uint64_t frame) {
                        observations.end());
   }
   keep_if([](const Track& track) { return !track.observations.empty(); });
+}
+
+double TrackTable::median_parallax(const FrameRotation& from, const FrameRotation& to) const {
+  const Eigen::Matrix3d R_to_from = to.R_WC0.transpose() * from.R_WC0;
+  parallax_.clear();
+  std::size_t seen = 0;  // features in `to`
+  for (const Track& track : *this) {
+    const TrackObservation* a = nullptr;
+    const TrackObservation* b = nullptr;
+    for (const TrackObservation& o : track.observations) {
+      if (o.frame == from.frame) a = &o;
+      if (o.frame == to.frame) b = &o;
+    }
+    seen += b != nullptr ? 1 : 0;
+    if (a == nullptr || b == nullptr) continue;
+    const Eigen::Vector3d turned = R_to_from * a->left.homogeneous();
+    parallax_.push_back((b->left - turned.hnormalized()).norm());
+  }
+  if (static_cast<double>(parallax_.size()) < kMajority * static_cast<double>(seen) || parallax_.empty()) {
+    return std::numeric_limits<double>::infinity();
+  }
+  return upper_median(parallax_);
 }
 
 }  // namespace ear

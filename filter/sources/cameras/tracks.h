@@ -25,6 +25,12 @@ struct Track {
   std::vector<TrackObservation> observations;  ///< oldest first
 };
 
+/// A frame, and camera 0's rotation in it.
+struct FrameRotation {
+  std::uint64_t frame = 0;
+  Eigen::Matrix3d R_WC0 = Eigen::Matrix3d::Identity();
+};
+
 /// All tracks of the window, by id. Memory of ended tracks is used again.
 class TrackTable {
  public:
@@ -49,6 +55,11 @@ class TrackTable {
     size_ = kept;
   }
 
+  /// How far features moved from one frame to another beyond what the rotation alone does: the median over the common
+  /// ones, in normalized coordinates. Infinite where they are few: a frame that most of the other's features never saw
+  /// is no elder of theirs, however little the vehicle moved.
+  [[nodiscard]] double median_parallax(const FrameRotation& from, const FrameRotation& to) const;
+
   void clear() { size_ = 0; }
   [[nodiscard]] std::size_t size() const { return size_; }
   [[nodiscard]] const Track& operator[](std::size_t i) const { return tracks_[i]; }
@@ -59,6 +70,7 @@ class TrackTable {
  private:
   std::vector<Track> tracks_;  ///< the first size_ are alive, ids ascending
   std::size_t size_ = 0;
+  mutable std::vector<double> parallax_;  // memory that is used again
 };
 
 }  // namespace ear

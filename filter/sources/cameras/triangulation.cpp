@@ -1,7 +1,7 @@
 #include "filter/sources/cameras/triangulation.h"
 
 #include <Eigen/Cholesky>
-#include <cmath>
+#include <algorithm>
 
 namespace ear {
 namespace {
@@ -10,23 +10,15 @@ constexpr int kMaxIterations = 8;                // chosen
 constexpr double kSettled = 1e-10;               // chosen: squared step, in bearings and relative depth
 constexpr double kNegativeInverseDepth = -0.02;  // [1/m] chosen: noise puts far points slightly beyond infinity
 
-/// Inverse depth along the first ray for which all other rays are met best: each gives uv * z = xy, linear in it.
+/// Inverse depth along the first ray for which all other rays are met best.
 double linear_inverse_depth(const std::vector<Sighting>& sightings, const Eigen::Vector3d& bearing_A) {
   const Sighting& anchor = sightings.front();
-  double numerator = 0.0;
-  double denominator = 0.0;
+  InverseDepthSums sums;
   for (std::size_t i = 1; i < sightings.size(); ++i) {
     const Sighting& s = sightings[i];
-    const Eigen::Vector3d a = s.R_CW * (anchor.R_CW.transpose() * bearing_A);  // h = a + rho * b
-    const Eigen::Vector3d b = s.R_CW * (anchor.p_WC - s.p_WC);
-    for (int k = 0; k < 2; ++k) {
-      const double constant = s.uv(k) * a.z() - a(k);  // constant = rho * slope
-      const double slope = b(k) - s.uv(k) * b.z();
-      numerator += constant * slope;
-      denominator += slope * slope;
-    }
+    sums.add(s.R_CW * (anchor.R_CW.transpose() * bearing_A), s.R_CW * (anchor.p_WC - s.p_WC), s.uv);
   }
-  return denominator > 1e-12 ? numerator / denominator : 0.0;
+  return sums.inverse_depth(1e-12);
 }
 
 }  // namespace

@@ -2,9 +2,7 @@
 
 #include <algorithm>
 
-#include "filter/ingest/capacity.h"
-#include "filter/ingest/evidence.h"
-#include "filter/sources/cameras/parallax.h"
+#include "filter/ingest/limits.h"
 
 namespace ear {
 namespace {
@@ -16,13 +14,10 @@ constexpr double kWithoutUpdates = 0.6;  // [s] measured, docs/decisions: the st
 
 WindowRule::WindowRule(const FilterConfig& config, double focal_px)
     : max_size_(config.window), keyframe_parallax_px_(config.keyframe_parallax_px), focal_px_(focal_px) {
-  parallax_.reserve(2 * kFeatureCapacity);
   set_size(max_size_);
 }
 
-void WindowRule::set_size(int clones) {
-  size_ = static_cast<std::size_t>(std::clamp(clones, std::min(kLeastWindow, max_size_), max_size_));
-}
+void WindowRule::set_size(int clones) { size_ = static_cast<std::size_t>(std::clamp(clones, kLeastWindow, max_size_)); }
 
 void WindowRule::add_updates(int features, TimeNs t_ns) {
   features_ += features;
@@ -53,8 +48,7 @@ std::optional<std::size_t> WindowRule::to_marginalise(const State& x, const Trac
 
 double WindowRule::parallax_px(const Clone& from, const Clone& to, const State& x, const TrackTable& tracks) const {
   const Eigen::Matrix3d& R_BC0 = x.camera.T_BC0.R;
-  return focal_px_ *
-         median_parallax(tracks, {from.frame, from.T_WB.R * R_BC0}, {to.frame, to.T_WB.R * R_BC0}, parallax_);
+  return focal_px_ * tracks.median_parallax({from.frame, from.T_WB.R * R_BC0}, {to.frame, to.T_WB.R * R_BC0});
 }
 
 }  // namespace ear

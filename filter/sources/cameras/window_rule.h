@@ -2,7 +2,6 @@
 #pragma once
 
 #include <optional>
-#include <vector>
 
 #include "ear/filter_config.h"
 #include "filter/ekf/state.h"
@@ -35,9 +34,8 @@ class WindowRule {
   double keyframe_parallax_px_;
   double focal_px_;
   std::size_t size_ = 0;
-  TimeNs updated_ns_ = 0;                 ///< when features last showed enough of where the vehicle is
-  int features_ = 0;                      ///< used since then
-  mutable std::vector<double> parallax_;  // memory that is used again
+  TimeNs updated_ns_ = 0;  ///< when features last showed enough of where the vehicle is
+  int features_ = 0;       ///< used since then
 };
 
 }  // namespace ear

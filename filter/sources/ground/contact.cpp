@@ -3,7 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "filter/ingest/silence.h"
+#include "filter/ekf/initial_state.h"
+#include "filter/ingest/limits.h"
 
 namespace ear {
 namespace {
@@ -14,7 +15,7 @@ constexpr double kOtherGround = 0.2;  // [m] chosen: over which the ground becom
 
 ContactDetector::ContactDetector(const FilterConfig& config, const Calibration& calibration) : config_(config.contact) {
   if (!calibration.encoder) return;
-  if (!calibration.lasers || calibration.lasers->beams.empty()) {
+  if (!has_beams(calibration)) {
     mode_ = ContactMode::ground;
     return;
   }
@@ -24,7 +25,7 @@ ContactDetector::ContactDetector(const FilterConfig& config, const Calibration& 
 }
 
 ContactEvent ContactDetector::add_imu(const ImuSample& sample) {
-  if (!ground_ || !sample.gyro_B.allFinite() || !sample.accel_B.allFinite()) return ContactEvent::none;
+  if (!ground_) return ContactEvent::none;
   if (last_imu_ns_ && sample.t_ns <= *last_imu_ns_) return ContactEvent::none;
   const double dt = last_imu_ns_ ? seconds_between(*last_imu_ns_, sample.t_ns) : 0.0;
   last_imu_ns_ = sample.t_ns;

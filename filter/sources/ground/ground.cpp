@@ -2,16 +2,16 @@
 
 #include <cmath>
 
+#include "filter/ekf/initial_state.h"
 #include "filter/ekf/propagation.h"
-#include "filter/ingest/silence.h"
+#include "filter/ingest/limits.h"
 #include "filter/sources/ground/ground_rows.h"
 
 namespace ear {
 
 Ground::Ground(const FilterConfig& config, const Calibration& calibration)
     : config_(config.odometer), level_off_(config.contact.confirmed_height), contact_(config, calibration) {
-  const bool lasers = calibration.lasers && !calibration.lasers->beams.empty();
-  if (lasers && config.odometer.model == OdometerModel::terrain) lasers_ = calibration.lasers;
+  if (has_beams(calibration) && config.odometer.model == OdometerModel::terrain) lasers_ = calibration.lasers;
 }
 
 /// After a change of the ground under the wheels nothing is known of it.
@@ -31,7 +31,8 @@ void Ground::update(const BeamRanges& reading, const ImuBuffer& imu, CameraUpdat
   const Eigen::Matrix3d R_WB = motion_at(reading.t_ns, ekf.state().imu, imu).R_WB;
   if (!known() && !restart(reading, R_WB, ekf)) return;
   const State& x = ekf.state();
-  GroundRows<kMaxBeams + 1> z;
+  static_assert(kMaxBeams + 1 <= GroundRows::size);
+  GroundRows z;
   for (std::size_t beam = 0; beam < lasers_->beams.size(); ++beam) {
     const double range = reading.range[beam];
     if (!(range >= lasers_->range_min && range <= lasers_->range_max)) continue;
@@ -43,6 +44,7 @@ void Ground::update(const BeamRanges& reading, const ImuBuffer& imu, CameraUpdat
     z.residual(z.count) = range - predicted.range;
     z.sigma(z.count) = std::hypot(lasers_->noise, config_.unevenness);
     const Innovation innovation = weigh(z, running_.beam[beam], reading.t_ns, ekf);
+    ++z.count;
     records.log.add(beam_source(beam), innovation, reading.t_ns);
     ++(innovation.fits ? records.statistics.beams_used : records.statistics.beams_rejected);
   }
@@ -51,16 +53,16 @@ void Ground::update(const BeamRanges& reading, const ImuBuffer& imu, CameraUpdat
   z.residual(z.count) = -axle.lean;
   z.sigma(z.count) = std::sqrt(2.0) * config_.unevenness / x.odometer.track_width;
   weigh(z, running_.axle, reading.t_ns, ekf);
+  ++z.count;
   ekf.apply(z, 1.0, calibration);
 }
 
-/// The newest row's noise grows with what did not fit. Nothing else shows the ground: where all beams contradict it,
-/// it is the plane that is wrong, and what pull they keep brings it back.
-Innovation Ground::weigh(GroundRows<kMaxBeams + 1>& z, NoiseScore& score, TimeNs t_ns, const Ekf& ekf) const {
-  const int row = z.count++;
-  Innovation innovation = ekf.test(z.H.row(row), z.residual(row), z.sigma(row));
-  const double noise = z.sigma(row) * z.sigma(row);
-  z.sigma(row) *= std::sqrt(score.add(innovation.value, {innovation.variance - noise, noise, config_.scores}, t_ns));
+/// The noise of the row at hand, not yet counted, grows with what did not fit. Nothing else shows the ground: where all
+/// beams contradict it, it is the plane that is wrong, and what pull they keep brings it back.
+Innovation Ground::weigh(GroundRows& z, NoiseScore& score, TimeNs t_ns, const Ekf& ekf) const {
+  double& sigma = z.sigma(z.count);
+  Innovation innovation = ekf.test(z.H.row(z.count), z.residual(z.count), sigma);
+  sigma *= std::sqrt(score.add(innovation, sigma, config_.scores, t_ns));
   innovation.score = score.weight();
   return innovation;
 }

@@ -46,7 +46,7 @@ class Ground {
  private:
   ContactEvent note(ContactEvent event);
   bool restart(const BeamRanges& reading, const Eigen::Matrix3d& R_WB, Ekf& ekf);
-  Innovation weigh(GroundRows<kMaxBeams + 1>& z, NoiseScore& score, TimeNs t_ns, const Ekf& ekf) const;
+  Innovation weigh(GroundRows& z, NoiseScore& score, TimeNs t_ns, const Ekf& ekf) const;
 
   struct Running {
     std::array<NoiseScore, kMaxBeams> beam;

@@ -5,8 +5,7 @@
 #include <cmath>
 
 #include "filter/ekf/so3.h"
-#include "filter/ingest/evidence.h"
-#include "filter/ingest/silence.h"
+#include "filter/ingest/limits.h"
 
 namespace ear {
 namespace {
@@ -65,11 +64,12 @@ GroundTracker::Sighting GroundTracker::update(const LaserSample& sample) {
   predict(dt);
 
   Sighting sighting;
+  int readings = 0;  // beams with a return
   const Eigen::Vector3d before_B = n_B();
   const std::size_t count = std::min(lasers_.beams.size(), sample.range.size());
   for (std::size_t i = 0; i < count; ++i) {
     if (!usable(beams_[i], sample.range[i])) continue;
-    ++sighting.readings;
+    ++readings;
     const Eigen::Vector3d hit_B = lasers_.beams[i].p_BL + sample.range[i] * lasers_.beams[i].d_B - p_BO_;
     if (!update_with_hit(beams_[i], lasers_.beams[i].d_B, hit_B)) continue;
     const double lift = -before_B.dot(hit_B) - radius_;
@@ -77,7 +77,7 @@ GroundTracker::Sighting GroundTracker::update(const LaserSample& sample) {
     ++sighting.agreeing;
   }
   if (sighting.agreeing > 0) lost_ = 0;
-  if (sighting.agreeing == 0 && sighting.readings >= 2) ++lost_;
+  if (sighting.agreeing == 0 && readings >= 2) ++lost_;
   if (lost_ >= kConfirmed || (!up_B_.isZero() && n_B().dot(up_B_) < std::cos(kSteepest))) forget();
   return sighting;
 }

@@ -39,7 +39,6 @@ class GroundTracker {
 
   /// How one reading of the beams agreed with the plane tracked so far.
   struct Sighting {
-    int readings = 0;          ///< beams with a return
     int agreeing = 0;          ///< those that passed the gate and updated the plane
     double lowest_lift = 0.0;  ///< smallest height that one of those sees, with the normal tracked so far [m]
   };

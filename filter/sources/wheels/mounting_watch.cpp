@@ -6,8 +6,7 @@
 #include <complex>
 
 #include "filter/ekf/state.h"
-#include "filter/ingest/evidence.h"
-#include "filter/ingest/silence.h"
+#include "filter/ingest/limits.h"
 #include "filter/ingest/stream_clock.h"
 
 namespace ear {

@@ -1,8 +1,5 @@
 #include "filter/sources/wheels/wheel_rows.h"
 
-#include <algorithm>
-#include <cmath>
-
 namespace ear {
 
 void WheelRows::measure_at(double lever) {

@@ -1,11 +1,12 @@
 #include "filter/sources/wheels/wheels.h"
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 #include <initializer_list>
 
 #include "filter/ekf/propagation.h"
-#include "filter/ingest/silence.h"
+#include "filter/ingest/limits.h"
 
 namespace ear {
 namespace {
@@ -34,16 +35,15 @@ void Wheels::update(const WheelIncrement& increment, const Context& context, Ekf
 
   const bool use_yaw_rate = config_.model != OdometerModel::gyro;
   const std::array<bool, WheelRows::size> use = {true, true, !uses_plane() || context.ground_known, use_yaw_rate};
-  GroundRows<WheelRows::size> z;
+  static_assert(WheelRows::size <= GroundRows::size);
+  GroundRows z;
   for (int row = 0; row < WheelRows::size; ++row) {
     if (!use[static_cast<std::size_t>(row)]) continue;
     if (row != WheelRows::speed) {
       const Innovation innovation = ekf.test(rows.H.row(row), rows.residual(row), sigma(row));
       if (row == WheelRows::slope && !innovation.fits) running_.lifted_ns = increment.to_ns;
       NoiseScore& score = running_.row[static_cast<std::size_t>(row)];
-      const double noise = sigma(row) * sigma(row);
-      sigma(row) *=
-          std::sqrt(score.add(innovation.value, {innovation.variance - noise, noise, config_.scores}, increment.to_ns));
+      sigma(row) *= std::sqrt(score.add(innovation, sigma(row), config_.scores, increment.to_ns));
       count(score, records.statistics);
     }
     z.H.row(z.count) = rows.H.row(row);
@@ -114,8 +114,7 @@ void Wheels::score_wheels(WheelRows& rows, Sigmas& sigma, const WheelIncrement& 
     Innovation innovation =
         ekf.test(H, rows.residual(WheelRows::speed) + side * rows.residual(WheelRows::yaw_rate), noise);
     NoiseScore& score = running_.wheel[i];
-    const double factor = score.add(
-        innovation.value, {innovation.variance - noise * noise, noise * noise, config_.scores}, increment.to_ns);
+    const double factor = score.add(innovation, noise, config_.scores, increment.to_ns);
     information[i] = 1.0 / (1.0 + (factor - 1.0) * readings);
     innovation.fits = score.fits();
     innovation.score = context.weight * score.weight();

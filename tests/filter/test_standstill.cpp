@@ -1,6 +1,6 @@
 #include <doctest/doctest.h>
 
-#include "filter/sources/standstill/standstill_detector.h"
+#include "filter/sources/standstill/standstill.h"
 
 using namespace ear;
 
@@ -33,54 +33,63 @@ ImuStatistics quiet() {
 
 constexpr TimeNs kFrame = 33'333'333;
 
+Standstill watch() { return {StandstillConfig{}, kFocal, FilterConfig{}.window}; }
+
+/// Does the vehicle stand, with this frame?
+bool stands(Standstill& standstill, const FeatureFrame& frame, const ImuStatistics& imu = quiet(),
+            bool on_ground = false) {
+  standstill.update({frame, frame.t_ns, imu, Eigen::Vector3d(Eigen::Vector3d::Zero()), on_ground});
+  return standstill.stands();
+}
+
 }  // namespace
 
 TEST_CASE("standstill: believed after its duration, not before") {
-  StandstillDetector detector(StandstillConfig{}, kFocal);
+  Standstill standstill = watch();
   for (int i = 0; i < 30; ++i) {
     CAPTURE(i);
-    const bool still = detector.update(frame_at(i * kFrame, 0.0), quiet(), Eigen::Vector3d::Zero(), 0.02, std::nullopt);
+    const bool still = stands(standstill, frame_at(i * kFrame, 0.0));
     CHECK(still == (i >= 16));  // 15 periods of 33333333 ns are just short of 0.5 s
   }
 }
 
 TEST_CASE("standstill: gliding with a quiet IMU is no standing, however slow") {
-  StandstillDetector detector(StandstillConfig{}, kFocal);
+  Standstill standstill = watch();
   for (int i = 0; i < 90; ++i) {
-    CHECK_FALSE(detector.update(frame_at(i * kFrame, 0.05 * i), quiet(), Eigen::Vector3d::Zero(), 0.02, std::nullopt));
+    CHECK_FALSE(stands(standstill, frame_at(i * kFrame, 0.05 * i)));
   }
 }
 
 TEST_CASE("standstill: a shaken or turning IMU ends it at once") {
-  StandstillDetector detector(StandstillConfig{}, kFocal);
+  Standstill standstill = watch();
   int i = 0;
-  for (; i < 30; ++i) detector.update(frame_at(i * kFrame, 0.0), quiet(), Eigen::Vector3d::Zero(), 0.02, std::nullopt);
+  for (; i < 30; ++i) stands(standstill, frame_at(i * kFrame, 0.0));
   ImuStatistics shaken = quiet();
   shaken.accel_spread = 4.0;
-  CHECK_FALSE(detector.update(frame_at(i * kFrame, 0.0), shaken, Eigen::Vector3d::Zero(), 0.02, std::nullopt));
+  CHECK_FALSE(stands(standstill, frame_at(i * kFrame, 0.0), shaken));
   ImuStatistics turning = quiet();
   turning.gyro_mean = {0.0, 0.0, 0.1};
-  CHECK_FALSE(detector.update(frame_at((i + 20) * kFrame, 0.0), turning, Eigen::Vector3d::Zero(), 0.02, std::nullopt));
+  CHECK_FALSE(stands(standstill, frame_at((i + 20) * kFrame, 0.0), turning));
 }
 
 TEST_CASE("standstill: without features it is not known") {
-  StandstillDetector detector(StandstillConfig{}, kFocal);
+  Standstill standstill = watch();
   for (int i = 0; i < 60; ++i) {
     FeatureFrame empty;
     empty.t_ns = i * kFrame;
-    CHECK_FALSE(detector.update(empty, quiet(), Eigen::Vector3d::Zero(), 0.02, std::nullopt));
+    CHECK_FALSE(stands(standstill, empty));
   }
 }
 
 TEST_CASE("standstill: steps without an image in between do not hide that it slides on wheels at rest") {
-  StandstillDetector detector(StandstillConfig{}, kFocal);
-  constexpr double kResting = 2.0;  // [s]
+  Standstill standstill = watch();
   bool still = false;
   const auto see = [&](int i, double shift_px) {
-    still = detector.update(frame_at(i * kFrame, shift_px), quiet(), Eigen::Vector3d::Zero(), 0.02, kResting);
+    standstill.add({(i - 1) * kFrame, i * kFrame});
+    still = stands(standstill, frame_at(i * kFrame, shift_px), quiet(), true);
     FeatureFrame step;
     step.t_ns = i * kFrame + kFrame / 2;
-    detector.update(step, quiet(), Eigen::Vector3d::Zero(), 0.02, kResting);
+    stands(standstill, step, quiet(), true);
   };
   for (int i = 0; i < 40; ++i) see(i, 0.0);
   CHECK(still);

@@ -1,9 +1,13 @@
-// How long nothing may come, and what is too old to count: for samples, starts, sources and health alike.
+// What several rules share: how long nothing may come, how much must be seen, how much memory is taken. For samples,
+// starts, sources and health alike.
 #pragma once
 
 #include <algorithm>
+#include <cstddef>
 
 namespace ear {
+
+// ---- Time
 
 /// [s] chosen: a moment. Samples that do not come for so long are missing, and the stamp that follows needs to be
 /// confirmed; what came within it is recent: a mean, a noise, an image, wheels that seemed to lift.
@@ -13,8 +17,6 @@ inline constexpr double kStale = 0.5;
 /// [s] chosen: without inertial samples, or with nothing but these, for so long, and the state is lost. So stamps that
 /// are off by more are of another clock, and older readings start nothing.
 inline constexpr double kLostAfter = 2.0;
-/// Chosen: so many samples in a row confirm each other; one may have a false stamp.
-inline constexpr int kConfirmed = 3;
 /// Chosen: one sample may be lost; so many of the usual intervals are a gap.
 inline constexpr double kMissed = 2.5;
 /// [s] chosen: but not less than this. Nor is a reading used that comes later.
@@ -22,5 +24,23 @@ inline constexpr double kSilent = 0.12;
 
 /// How long a sensor may be silent [s] that usually delivers every `interval` seconds; 0: not known.
 [[nodiscard]] inline double longest_silence(double interval) { return std::max(kSilent, kMissed * interval); }
+
+// ---- Evidence
+
+/// [s] chosen: of what a regression is made of, of an interval, which a crystal keeps, and of how late stamps are.
+inline constexpr double kSlopeMemory = 100.0;
+inline constexpr double kClear = 4.0;  ///< chosen: so many standard deviations are not chance
+inline constexpr int kToKnow = 20;     ///< chosen: a mean of so many is known, whatever their rate
+/// Chosen: so many samples in a row confirm each other; one may have a false stamp.
+inline constexpr int kConfirmed = 3;
+/// Chosen: fewer features show too little of where the vehicle is, or of how it moved.
+inline constexpr int kFewFeatures = 10;
+
+// ---- Memory
+
+/// Frames with up to so many features are processed without asking for memory. The first one with more takes it then.
+inline constexpr std::size_t kFeatureCapacity = 256;
+/// Chosen: samples of one stream that are kept: 20 s at 200 Hz, 4 s at 1 kHz.
+inline constexpr std::size_t kCapacity = 4096;
 
 }  // namespace ear
