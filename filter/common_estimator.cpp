@@ -117,7 +117,7 @@ void CommonEstimator::add_laser(const LaserSample& given) {
     health_.add_laser(sample, verdict, *calibration_.lasers, sources_.ground().stuck_beams(), newest_ns);
   }
   if (verdict != Verdict::accepted) return;
-  if (const auto due_ns = ingest_.push(BeamRanges(sample), ekf_.running())) make_room(*due_ns);
+  if (const auto due_ns = ingest_.push(BeamRanges(sample, *calibration_.lasers), ekf_.running())) make_room(*due_ns);
 }
 
 std::optional<TimeNs> CommonEstimator::common_stamp(TimeNs camera_stamp_ns) {
@@ -205,9 +205,8 @@ std::optional<RelativeMotion> CommonEstimator::motion_to(TimeNs t_ns) const {
   if (!is_time(t_ns) || !last || ingest_.imu().empty() || t_ns <= last->t_ns) return std::nullopt;
   const CameraState& camera = ekf_.state().camera;
   const TimeNs to_ns = imu_time(t_ns, camera);
-  if (ekf_.running()) {
-    return motion_between(sources_.cameras().image_pose(ekf_.state()),
-                          nav_state(integrate_to(to_ns, ekf_.state().imu, ingest_.imu())));
+  if (const std::optional<Pose> before = sources_.cameras().image_pose(ekf_.state())) {
+    return motion_between(*before, nav_state(integrate_to(to_ns, ekf_.state().imu, ingest_.imu())));
   }
   RelativeMotion motion;
   if (const std::optional<Eigen::Vector3d> path = start_.path_to(to_ns)) {

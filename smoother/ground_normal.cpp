@@ -47,7 +47,7 @@ bool GroundNormal::add(const BeamRanges& ranges, const OdometerState& odometer, 
   int used = 0;
   const double sigma = std::hypot(lasers_.noise, config_.unevenness);
   for (std::size_t i = 0; i < lasers_.beams.size(); ++i) {
-    if (!(range[i] >= lasers_.range_min && range[i] <= lasers_.range_max)) continue;
+    if (std::isnan(range[i])) continue;
     const BeamPrediction z = predict_range(x, I, lasers_.beams[i], 0.0);
     const Innovation innovation = take(range[i] - z.range, z.H_normal, sigma);
     records.log.add(beam_source(i), innovation, ranges.t_ns);

@@ -29,6 +29,7 @@ void Ekf::start(const ImuState& x, const Eigen::VectorXd& sigma, bool scale_is_g
   running_ = true;
   state_.imu = x;
   started_W_ = x.p_WB;
+  rate_B_.setZero();
   turned_ = 0.0;
   turned_path_.setZero();
   covariance_.reset(sigma);

@@ -26,8 +26,9 @@ ImuMotion imu_motion(const ImuState& x, const ImuBuffer& samples, TimeNs to_ns, 
       });
   if (!(motion.duration > 0.0)) return motion;
   // The error goes on as if all samples were their mean: a frame is short.
-  const ErrorTransition error = error_transition(begin, turned_B / motion.duration, gained_B / motion.duration,
-                                                 motion.duration, with_factors(imu, worst));
+  const ImuCalibration noise = with_factors(imu, worst);
+  const ErrorTransition error =
+      error_transition(begin, turned_B / motion.duration, gained_B / motion.duration, motion.duration, noise);
   const Eigen::Matrix3d R_BW = x.R_WB.transpose();
   motion.T_BiBj = {R_BW * end.R_WB, R_BW * end.p_WB};
   Eigen::Matrix<double, 3, err::imu_size> H_end = Eigen::Matrix<double, 3, err::imu_size>::Zero();
@@ -35,7 +36,13 @@ ImuMotion imu_motion(const ImuState& x, const ImuBuffer& samples, TimeNs to_ns, 
   H_end.middleCols<3>(err::rho) = R_BW;
   motion.H = H_end * error.Phi - H_end;
   motion.turn_variance = error.Q(err::theta, err::theta);
-  motion.covariance = H_end * error.Q * H_end.transpose();
+  // White noise over the time T is not one error for all of it: of the accelerometer's, T^3 / 3 comes to the position
+  // where one error would bring T^3 / 4, and of the gyroscope's T^5 / 20 where one would bring T^5 / 36.
+  const auto spread = [&motion](int bias, double density, double share) -> Eigen::Matrix3d {
+    const Eigen::Matrix3d J = motion.H.middleCols<3>(bias);
+    return share * density * density / motion.duration * J * J.transpose();
+  };
+  motion.covariance = spread(err::b_a, noise.accel_noise, 4.0 / 3.0) + spread(err::b_g, noise.gyro_noise, 9.0 / 5.0);
   return motion;
 }
 

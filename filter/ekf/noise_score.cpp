@@ -28,7 +28,8 @@ double NoiseScore::add(double residual, const Expected& expected, TimeNs t_ns) {
   double square = 0.0;
   for (int i = 0; i < kIterations; ++i) {
     const double share = believed * expected.noise / (expected.state + believed * expected.noise);
-    square = std::min((residual * residual * share + expected.state) * share / expected.noise, farthest_);
+    square = (residual * residual * share + expected.state) * share / expected.noise;
+    square = std::min(farthest_, square);  // of what is no number too
     believed = factor(square, 1.0);
   }
   squares_ += square;

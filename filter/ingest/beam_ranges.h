@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <array>
+#include <limits>
 
+#include "ear/calibration.h"
 #include "ear/types.h"
 
 namespace ear {
@@ -11,11 +13,14 @@ namespace ear {
 /// The most laser beams that a vehicle may have.
 inline constexpr int kMaxBeams = 3;
 
-/// Ranges of one reading of the lasers [m]; NaN without return.
+/// Ranges of one reading of the lasers [m]; NaN without return, and out of their limits.
 struct BeamRanges {
   BeamRanges() = default;
-  explicit BeamRanges(const LaserSample& sample) : t_ns(sample.t_ns) {
-    std::copy_n(sample.range.begin(), std::min(sample.range.size(), range.size()), range.begin());
+  BeamRanges(const LaserSample& sample, const LaserCalibration& lasers) : t_ns(sample.t_ns) {
+    for (std::size_t i = 0; i < std::min(sample.range.size(), range.size()); ++i) {
+      const bool measured = sample.range[i] >= lasers.range_min && sample.range[i] <= lasers.range_max;
+      range[i] = measured ? sample.range[i] : std::numeric_limits<double>::quiet_NaN();
+    }
   }
 
   TimeNs t_ns = 0;

@@ -43,7 +43,8 @@ class SpikeWatch {
   bool add(ImuBuffer& samples, double dt, bool no_strike, bool clips);
   /// Samples in a row, with the newest, that may be a spike.
   [[nodiscard]] std::size_t length() const { return length_; }
-  /// The newest sample ends no spike, and those before it were none: a strike, which leaves them as uncertain as a spike.
+  /// The newest sample ends no spike, and those before it were none: a strike, which leaves them as uncertain as a
+  /// spike.
   void give_up(ImuBuffer& samples);
 
  private:

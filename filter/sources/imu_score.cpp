@@ -57,7 +57,7 @@ std::optional<Innovation> ImuScore::add_excess(const ExcessTurn& turn, const Imu
 
 std::optional<Innovation> ImuScore::add(const ImuMotion& motion, const StereoMotion& images, const Covariance& P,
                                         TimeNs t_ns) {
-  if (images.fitting < kStill * images.matches) return std::nullopt;
+  if (!(motion.duration > 0.0) || images.fitting < kStill * images.matches) return std::nullopt;
   StereoMotion seen = images;
   seen.covariance *= kCommon;
   const Eigen::Matrix3d by_state = motion.by_state(P);

@@ -3,7 +3,10 @@
 #include <cmath>
 #include <random>
 
+#include "filter/ekf/ekf.h"
+#include "filter/ekf/initial_state.h"
 #include "filter/ekf/so3.h"
+#include "filter/sources/cameras/cameras.h"
 #include "filter/sources/cameras/frame_check.h"
 
 using namespace ear;
@@ -68,4 +71,37 @@ TEST_CASE("image noise: a third of wrong matches does not make it twice as large
   CHECK(measured(frame, make_rig()) < 2e-3);
   frame.features.resize(19);
   CHECK(measured(frame, make_rig()) == 0.0);
+}
+
+TEST_CASE("frame check: an image from before the start, or from before a restart, is compared with nothing") {
+  Calibration calibration;
+  calibration.cameras.resize(2);
+  calibration.cameras[1].T_BC.translation().y() = -0.1;
+  const FilterConfig config;
+  Ekf ekf(config, calibration);
+  Cameras cameras(config, calibration);
+  const auto see = [&](TimeNs t_ns) {
+    FeatureFrame frame = look(camera_state(calibration), 40, 1e-4, 5);
+    frame.t_ns = t_ns;
+    cameras.measure_noise(frame, ekf.state().camera);
+    const int matches = ekf.running() ? cameras.compare(frame, ekf).matches : 0;
+    cameras.remember(frame, ekf);
+    return matches;
+  };
+  const auto start = [&](const Eigen::Vector3d& tilt) {
+    ImuState x;
+    x.R_WB = exp_so3(tilt);
+    ekf.start(x, Eigen::VectorXd::Constant(err::clones, 0.1));
+    ekf.clone(1.0);
+  };
+  see(0);
+  CHECK_FALSE(cameras.image_pose(ekf.state()).has_value());
+  start({0.3, 0.1, 0.0});
+  CHECK(see(100'000'000) == 0);
+  CHECK(see(200'000'000) == 40);
+  ekf.reset();
+  cameras.reset();
+  start({0.0, -0.4, 0.0});
+  CHECK(see(300'000'000) == 0);
+  CHECK(see(400'000'000) == 40);
 }

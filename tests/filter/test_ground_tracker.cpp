@@ -74,7 +74,7 @@ TEST_CASE("ground tracker: two beams and the gyroscope go on when the third is l
     }
     for (int i = 0; i < 100; ++i) {
       CAPTURE(i);
-      CHECK(lost.step(0.0, [&](LaserSample& s) { s.range[beam] = kNothing; }).readings == 2);
+      CHECK(lost.step(0.0, [&](LaserSample& s) { s.range[beam] = kNothing; }).agreeing == 2);
       stuck.step(0.0, [&](LaserSample& s) { s.range[beam] = 0.097; });
       CHECK(wrong.step(0.0, [&](LaserSample& s) { s.range[beam] -= 0.06; }).agreeing == 2);
       for (const Flight* flight : {&lost, &stuck, &wrong}) {
@@ -108,4 +108,11 @@ TEST_CASE("ground tracker: without readings it does not know, and afterwards it 
   for (int i = 0; i < 6; ++i) flight.step(2.0);
   CHECK(flight.tracker.height() == about(2.0, 0.02));
   CHECK(flight.tracker.height_sigma() < 0.02);
+}
+
+TEST_CASE("ground tracker: a reading that was ahead of time takes nothing from those after it") {
+  Flight flight;
+  flight.step(0.3, [](LaserSample& sample) { sample.t_ns += 3'600'000'000'000; });
+  for (int i = 0; i < 10; ++i) CHECK(flight.step(0.3).agreeing == 3);
+  CHECK(flight.tracker.height() == about(0.3, 0.05));
 }

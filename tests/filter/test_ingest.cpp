@@ -3,6 +3,8 @@
 
 #include <doctest/doctest.h>
 
+#include <cmath>
+
 #include <vector>
 
 using namespace ear;
@@ -46,7 +48,7 @@ TEST_CASE("ingest: readings come out in the order of their times, increments at 
   push(ingest, 10 * kMs, 100);
   push(ingest, 20 * kMs, 200);
   for (const TimeNs t_ns : {2 * kMs, 12 * kMs}) {
-    CHECK_FALSE(ingest.push(BeamRanges(LaserSample{t_ns, {0.1, 0.2, 0.3}}), true));
+    CHECK_FALSE(ingest.push(BeamRanges(LaserSample{t_ns, {0.1, 0.2, 0.3}}, LaserCalibration{}), true));
   }
   std::vector<TimeNs> times;
   while (const auto next = ingest.next(18 * kMs)) {
@@ -123,7 +125,7 @@ TEST_CASE("ingest: a restart forgets samples and readings, not the counts") {
 TEST_CASE("ingest: of readings that are dropped, passed ones too, nothing is left for another state") {
   Ingest ingest = filled(50 * kMs);
   for (int i = 0; i < 4; ++i) push(ingest, 10 * kMs * i, i);
-  CHECK_FALSE(ingest.push(BeamRanges(LaserSample{20 * kMs, {0.1, 0.2, 0.3}}), true));
+  CHECK_FALSE(ingest.push(BeamRanges(LaserSample{20 * kMs, {0.1, 0.2, 0.3}}, LaserCalibration{}), true));
   REQUIRE(ingest.next(10 * kMs));
   REQUIRE(ingest.increments().size() == 3);
   ingest.drop_readings();
@@ -145,4 +147,15 @@ TEST_CASE("ingest: of a full queue the state has to pass the oldest first; witho
   CHECK_FALSE(ingest.push(increment, false));
   CHECK(seconds_between(ingest.waiting_increments().front().from_ns, increment.to_ns) <= 2.0);
   CHECK(seconds_between(ingest.waiting_increments().front().from_ns, increment.to_ns) > 1.9);
+}
+
+TEST_CASE("ingest: a range out of its limits is no return") {
+  LaserCalibration lasers;
+  lasers.range_min = 0.05;
+  lasers.range_max = 4.0;
+  const BeamRanges ranges({5 * kMs, {0.04, 0.3, 65.535}}, lasers);
+  CHECK(std::isnan(ranges.range[0]));
+  CHECK(ranges.range[1] == 0.3);
+  CHECK(std::isnan(ranges.range[2]));
+  CHECK(ranges.t_ns == 5 * kMs);
 }

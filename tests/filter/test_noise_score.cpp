@@ -105,3 +105,11 @@ TEST_CASE("noise_score: what the state does not know is no fault of the sensor")
   CHECK(score.add(1.0, {1.0, 1e-4}, kStep) < 1.5);
   CHECK(score.fits());
 }
+
+TEST_CASE("noise_score: what is no number does not fit") {
+  NoiseScore score;
+  score.add(std::nan(""), {1e-4, 1e-4}, kStep);
+  CHECK(score.weight() < 0.01);
+  for (int i = 2; i < 200; ++i) score.add(0.0, {1e-6, 1e-4}, i * kStep);
+  CHECK(score.weight() > 0.9);
+}

@@ -13,6 +13,11 @@ namespace {
 constexpr double kBridgePosition = 5e-3;  // [m] chosen, as kSeenTurn: well above what the features will show later
 constexpr double kComparedStep = 1e-4;    // [rad, m] chosen: a tenth of what two images show
 
+/// The body now, in the body as it was.
+Pose motion_since(const Pose& T_WB0, const ImuState& now) {
+  return {T_WB0.R.transpose() * now.R_WB, T_WB0.R.transpose() * (now.p_WB - T_WB0.p)};
+}
+
 }  // namespace
 
 Cameras::Cameras(const FilterConfig& config, const Calibration& calibration)
@@ -25,33 +30,29 @@ Cameras::Cameras(const FilterConfig& config, const Calibration& calibration)
       frame_check_(config.feature_sigma_px, focal_px_),
       rows_(6, err::clone(config.window + 1)) {
   last_features_.features.reserve(kFeatureCapacity);
-  compared_.before.features.reserve(kFeatureCapacity);
 }
 
 void Cameras::measure_noise(const FeatureFrame& frame, const CameraState& cameras) {
-  compared_.matched_ns.reset();
+  compared_.matched = false;
   compared_.seen.reset();
   if (count_ > 1) frame_check_.measure_noise(frame, cameras);
 }
 
-Displacement Cameras::displacement(const FeatureFrame& frame, TimeNs t_ns, const ImuMotion& motion, const Ekf& ekf) {
+Displacement Cameras::displacement(const FeatureFrame& frame, const ImuMotion& motion, const Ekf& ekf) {
   Displacement result;
-  if (ekf.state().imu.t_ns == compared_.t_ns) {  // else the frame before was not where the state is
-    const std::vector<StereoMatch>& matches = matches_.find(compared_.before, frame, ekf.state().camera);
-    compared_.matched_ns = compared_.before.t_ns;
-    compared_.seen =
-        stereo_motion(matches, ekf.state().camera, motion.T_BiBj, frame_check_.sigma(), kComparedStep, config_.kernels);
-    result.available = compared_.seen.has_value();
-    result.contradictory = !compared_.seen && matches.size() >= kFewFeatures;
-    if (compared_.seen) result.p_BiBj = compared_.seen->T_B0B1.p;
-    if (compared_.seen) result.covariance = compared_.seen->p_covariance();
-  }
-  compared_.t_ns = t_ns;
-  compared_.before = frame;
+  if (!last_ || last_->state_ns != ekf.state().imu.t_ns) return result;  // the last image was not where the state is
+  const std::vector<StereoMatch>& matches = matches_with(frame, ekf.state().camera);
+  compared_.seen =
+      stereo_motion(matches, ekf.state().camera, motion.T_BiBj, frame_check_.sigma(), kComparedStep, config_.kernels);
+  result.available = compared_.seen.has_value();
+  result.contradictory = !compared_.seen && matches.size() >= kFewFeatures;
+  if (compared_.seen) result.p_BiBj = compared_.seen->T_B0B1.p;
+  if (compared_.seen) result.covariance = compared_.seen->p_covariance();
   return result;
 }
 
-Pose Cameras::image_pose(const State& x) const {
+std::optional<Pose> Cameras::image_pose(const State& x) const {
+  if (!last_) return std::nullopt;
   if (!last_->clone) return last_->T_WB;
   const auto clone =
       std::find_if(x.clones.begin(), x.clones.end(), [this](const Clone& c) { return c.frame == *last_->clone; });
@@ -59,24 +60,18 @@ Pose Cameras::image_pose(const State& x) const {
   return clone->T_WB * last_->in_clone;
 }
 
-/// The body now, in the body at the last image.
-Pose Cameras::motion_since_image(const State& x) const {
-  const Pose T_WB0 = image_pose(x);
-  return {T_WB0.R.transpose() * x.imu.R_WB, T_WB0.R.transpose() * (x.imu.p_WB - T_WB0.p)};
-}
-
 const std::vector<StereoMatch>& Cameras::matches_with(const FeatureFrame& frame, const CameraState& cameras) {
-  if (compared_.matched_ns == last_->t_ns) return matches_.found();
-  compared_.matched_ns = last_->t_ns;
-  compared_.seen.reset();
-  return matches_.find(last_features_, frame, cameras);
+  if (!compared_.matched) matches_.find(last_features_, frame, cameras);
+  compared_.matched = true;
+  return matches_.found();
 }
 
 bool Cameras::bridge(const FeatureFrame& frame, Ekf& ekf) {
   const State& x = ekf.state();
-  if (!last_ || count_ < 2 || x.clones.empty()) return false;
+  const std::optional<Pose> before = image_pose(x);
+  if (!before || count_ < 2 || x.clones.empty()) return false;
   const std::optional<StereoMotion> motion =
-      stereo_motion(matches_with(frame, x.camera), x.camera, motion_since_image(x), frame_check_.sigma());
+      stereo_motion(matches_with(frame, x.camera), x.camera, motion_since(*before, x.imu), frame_check_.sigma());
   if (!motion) return false;
   const Eigen::Matrix3d R_WB0 = x.clones.back().T_WB.R;
   const Eigen::Matrix3d covariance = R_WB0 * motion->p_covariance() * R_WB0.transpose() +
@@ -100,11 +95,12 @@ FrameAgreement Cameras::compare(const FeatureFrame& frame, const Ekf& ekf) {
   compared_.agrees = true;
   if (count_ < 2) return agreement;
   const State& x = ekf.state();
-  const double dt = last_ ? seconds_between(last_->t_ns, frame.t_ns) : 0.0;
-  if (last_ && dt <= kStale) {
+  const std::optional<Pose> before = image_pose(x);
+  const double dt = before ? seconds_between(last_->t_ns, frame.t_ns) : 0.0;
+  if (before && dt <= kStale) {
     const double sigma_v = std::sqrt(ekf.covariance().matrix().diagonal().segment<3>(err::nu).maxCoeff());
-    agreement =
-        frame_check_.compare(matches_with(frame, x.camera), motion_since_image(x), dt * sigma_v, x.camera, ekf.gate());
+    agreement = frame_check_.compare(matches_with(frame, x.camera), motion_since(*before, x.imu), dt * sigma_v,
+                                     x.camera, ekf.gate());
     compared_.agrees = !agreement.contradicts();
   }
   agreement.noise = frame_check_.noise();
@@ -136,8 +132,10 @@ void Cameras::marginalise(std::optional<std::size_t> clone, Ekf& ekf) {
 
 void Cameras::remember(const FeatureFrame& frame, const Ekf& ekf) {
   const State& x = ekf.state();
-  last_ = LastImage{frame.t_ns, x.imu.T_WB(), std::nullopt, {}};
+  last_ = LastImage{frame.t_ns, x.imu.t_ns, std::nullopt, std::nullopt, {}};
   last_features_ = frame;
+  if (!ekf.running()) return;
+  last_->T_WB = x.imu.T_WB();
   if (x.clones.empty()) return;
   const Clone& clone = x.clones.back();
   const Eigen::Matrix3d R_BW = clone.T_WB.R.transpose();
@@ -154,8 +152,9 @@ void Cameras::reset() {
   tracks_.clear();
   track_update_.reset();
   window_.reset();
-  compared_.t_ns = 0;
-  if (last_) last_->clone.reset();
+  if (!last_) return;
+  last_->T_WB.reset();
+  last_->clone.reset();
 }
 
 }  // namespace ear

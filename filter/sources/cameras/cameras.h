@@ -21,7 +21,8 @@ namespace ear {
 /// The last image that was used.
 struct LastImage {
   TimeNs t_ns = 0;                     ///< its camera stamp
-  Pose T_WB;                           ///< the body then, as it was estimated then
+  TimeNs state_ns = 0;                 ///< the state's time when it was used
+  std::optional<Pose> T_WB;            ///< the body then, as it was estimated then; nothing without a state
   std::optional<std::uint64_t> clone;  ///< Clone::frame of the newest clone then
   Pose in_clone;                       ///< the body then, in that clone
 };
@@ -37,9 +38,8 @@ class Cameras {
 
   /// A new frame: how exact are its features? For all that is done with it.
   void measure_noise(const FeatureFrame& frame, const CameraState& cameras);
-  /// p^c of (13). `motion`: by the inertial samples, from where the state is to the frame at `t_ns` (IMU time).
-  [[nodiscard]] Displacement displacement(const FeatureFrame& frame, TimeNs t_ns, const ImuMotion& motion,
-                                          const Ekf& ekf);
+  /// p^c of (13), since the last image. `motion`: by the inertial samples, from where the state is to the frame.
+  [[nodiscard]] Displacement displacement(const FeatureFrame& frame, const ImuMotion& motion, const Ekf& ekf);
   /// The motion that it is of.
   [[nodiscard]] const std::optional<StereoMotion>& seen() const { return compared_.seen; }
 
@@ -67,23 +67,20 @@ class Cameras {
   void remember(const FeatureFrame& frame, const Ekf& ekf);
   [[nodiscard]] const std::optional<LastImage>& last_image() const { return last_; }
   /// Where the body was at the last image, by all that was measured since: what wheels and lasers measure until the
-  /// next image corrects clone and state alike, and is no motion. There must be an image.
-  [[nodiscard]] Pose image_pose(const State& x) const;
+  /// next image corrects clone and state alike, and is no motion. Nothing if there was no image, or no state then.
+  [[nodiscard]] std::optional<Pose> image_pose(const State& x) const;
 
   /// The state begins anew.
   void reset();
 
  private:
-  /// The frame at hand against the one before.
+  /// The frame at hand against the last image.
   struct Compared {
-    FeatureFrame before;               ///< that displacement() last saw,
-    TimeNs t_ns = 0;                   ///< at this IMU time
-    std::optional<TimeNs> matched_ns;  ///< stamp of the frame that matches_ holds the features of, and of this one
+    bool matched = false;              ///< matches_ holds the features of both
     std::optional<StereoMotion> seen;  ///< between these two
     bool agrees = true;                ///< most features were where the state expected them
   };
 
-  [[nodiscard]] Pose motion_since_image(const State& x) const;
   /// Of the last image that was used with the frame at hand.
   const std::vector<StereoMatch>& matches_with(const FeatureFrame& frame, const CameraState& cameras);
   void marginalise(std::optional<std::size_t> clone, Ekf& ekf);

@@ -27,7 +27,7 @@ void WindowRule::add_updates(int features, TimeNs t_ns) {
 }
 
 void WindowRule::reset() {
-  updated_ns_ = 0;
+  updated_ns_.reset();
   features_ = 0;
 }
 
@@ -42,7 +42,7 @@ std::optional<std::size_t> WindowRule::to_marginalise(const State& x, const Trac
     return parallax_px(a, b, x, tracks) < keyframe_parallax_px_;
   };
   const bool copy = same_place(x.clones[n - 3], x.clones[n - 2]);
-  const bool without_updates = seconds_between(updated_ns_, x.imu.t_ns) > kWithoutUpdates;
+  const bool without_updates = !updated_ns_ || seconds_between(*updated_ns_, x.imu.t_ns) > kWithoutUpdates;
   return copy && !without_updates && !same_place(x.clones.front(), x.clones.back()) ? n - 2 : 0;
 }
 

@@ -34,8 +34,8 @@ class WindowRule {
   double keyframe_parallax_px_;
   double focal_px_;
   std::size_t size_ = 0;
-  TimeNs updated_ns_ = 0;  ///< when features last showed enough of where the vehicle is
-  int features_ = 0;       ///< used since then
+  std::optional<TimeNs> updated_ns_;  ///< when features last showed enough of where the vehicle is
+  int features_ = 0;                  ///< used since then
 };
 
 }  // namespace ear

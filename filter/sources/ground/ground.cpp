@@ -35,7 +35,7 @@ void Ground::update(const BeamRanges& reading, const ImuBuffer& imu, CameraUpdat
   GroundRows z;
   for (std::size_t beam = 0; beam < lasers_->beams.size(); ++beam) {
     const double range = reading.range[beam];
-    if (!(range >= lasers_->range_min && range <= lasers_->range_max)) continue;
+    if (std::isnan(range)) continue;
     const BeamPrediction predicted =
         predict_range(x, R_WB, lasers_->beams[beam], x.odometer.beam_offset(static_cast<int>(beam)));
     z.H.row(z.count).segment<2>(ground_column(err::normal)) = predicted.H_normal;

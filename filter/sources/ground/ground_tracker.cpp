@@ -60,8 +60,8 @@ void GroundTracker::suppose_height(double level, double sigma) {
 GroundTracker::Sighting GroundTracker::update(const LaserSample& sample) {
   const double dt = last_ns_ ? seconds_between(*last_ns_, sample.t_ns) : 0.0;
   last_ns_ = sample.t_ns;
-  if (dt > kStale) forget();
-  predict(dt);
+  if (dt < 0.0 || dt > kStale) forget();
+  predict(std::max(0.0, dt));
 
   Sighting sighting;
   int readings = 0;  // beams with a return
