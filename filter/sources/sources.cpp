@@ -55,7 +55,7 @@ Displacements Sources::displacements(const FeatureFrame& frame, TimeNs t_ns, con
     result[index_of(MotionSensor::odometer)] =
         wheels_->displacement(ekf, ingest.increments(), ingest.imu(), t_ns, ground_known);
   }
-  result[index_of(MotionSensor::camera)] = cameras_.displacement(frame, motion_, ekf);
+  result[index_of(MotionSensor::camera)] = cameras_.displacement(frame, t_ns, motion_, ekf);
   return result;
 }
 

@@ -30,24 +30,29 @@ Cameras::Cameras(const FilterConfig& config, const Calibration& calibration)
       frame_check_(config.feature_sigma_px, focal_px_),
       rows_(6, err::clone(config.window + 1)) {
   last_features_.features.reserve(kFeatureCapacity);
+  compared_.before.features.reserve(kFeatureCapacity);
 }
 
 void Cameras::measure_noise(const FeatureFrame& frame, const CameraState& cameras) {
-  compared_.matched = false;
+  compared_.matched_ns.reset();
   compared_.seen.reset();
   if (count_ > 1) frame_check_.measure_noise(frame, cameras);
 }
 
-Displacement Cameras::displacement(const FeatureFrame& frame, const ImuMotion& motion, const Ekf& ekf) {
+Displacement Cameras::displacement(const FeatureFrame& frame, TimeNs t_ns, const ImuMotion& motion, const Ekf& ekf) {
   Displacement result;
-  if (!last_ || last_->state_ns != ekf.state().imu.t_ns) return result;  // the last image was not where the state is
-  const std::vector<StereoMatch>& matches = matches_with(frame, ekf.state().camera);
-  compared_.seen =
-      stereo_motion(matches, ekf.state().camera, motion.T_BiBj, frame_check_.sigma(), kComparedStep, config_.kernels);
-  result.available = compared_.seen.has_value();
-  result.contradictory = !compared_.seen && matches.size() >= kFewFeatures;
-  if (compared_.seen) result.p_BiBj = compared_.seen->T_B0B1.p;
-  if (compared_.seen) result.covariance = compared_.seen->p_covariance();
+  if (ekf.state().imu.t_ns == compared_.t_ns) {  // else the frame before was not where the state is
+    const std::vector<StereoMatch>& matches = matches_.find(compared_.before, frame, ekf.state().camera);
+    compared_.matched_ns = compared_.before.t_ns;
+    compared_.seen =
+        stereo_motion(matches, ekf.state().camera, motion.T_BiBj, frame_check_.sigma(), kComparedStep, config_.kernels);
+    result.available = compared_.seen.has_value();
+    result.contradictory = !compared_.seen && matches.size() >= kFewFeatures;
+    if (compared_.seen) result.p_BiBj = compared_.seen->T_B0B1.p;
+    if (compared_.seen) result.covariance = compared_.seen->p_covariance();
+  }
+  compared_.t_ns = t_ns;
+  compared_.before = frame;
   return result;
 }
 
@@ -61,9 +66,10 @@ std::optional<Pose> Cameras::image_pose(const State& x) const {
 }
 
 const std::vector<StereoMatch>& Cameras::matches_with(const FeatureFrame& frame, const CameraState& cameras) {
-  if (!compared_.matched) matches_.find(last_features_, frame, cameras);
-  compared_.matched = true;
-  return matches_.found();
+  if (compared_.matched_ns == last_->t_ns) return matches_.found();
+  compared_.matched_ns = last_->t_ns;
+  compared_.seen.reset();
+  return matches_.find(last_features_, frame, cameras);
 }
 
 bool Cameras::bridge(const FeatureFrame& frame, Ekf& ekf) {
@@ -132,7 +138,7 @@ void Cameras::marginalise(std::optional<std::size_t> clone, Ekf& ekf) {
 
 void Cameras::remember(const FeatureFrame& frame, const Ekf& ekf) {
   const State& x = ekf.state();
-  last_ = LastImage{frame.t_ns, x.imu.t_ns, std::nullopt, std::nullopt, {}};
+  last_ = LastImage{frame.t_ns, std::nullopt, std::nullopt, {}};
   last_features_ = frame;
   if (!ekf.running()) return;
   last_->T_WB = x.imu.T_WB();
@@ -152,6 +158,7 @@ void Cameras::reset() {
   tracks_.clear();
   track_update_.reset();
   window_.reset();
+  compared_.t_ns = 0;
   if (!last_) return;
   last_->T_WB.reset();
   last_->clone.reset();

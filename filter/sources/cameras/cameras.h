@@ -21,7 +21,6 @@ namespace ear {
 /// The last image that was used.
 struct LastImage {
   TimeNs t_ns = 0;                     ///< its camera stamp
-  TimeNs state_ns = 0;                 ///< the state's time when it was used
   std::optional<Pose> T_WB;            ///< the body then, as it was estimated then; nothing without a state
   std::optional<std::uint64_t> clone;  ///< Clone::frame of the newest clone then
   Pose in_clone;                       ///< the body then, in that clone
@@ -38,8 +37,9 @@ class Cameras {
 
   /// A new frame: how exact are its features? For all that is done with it.
   void measure_noise(const FeatureFrame& frame, const CameraState& cameras);
-  /// p^c of (13), since the last image. `motion`: by the inertial samples, from where the state is to the frame.
-  [[nodiscard]] Displacement displacement(const FeatureFrame& frame, const ImuMotion& motion, const Ekf& ekf);
+  /// p^c of (13). `motion`: by the inertial samples, from where the state is to the frame at `t_ns` (IMU time).
+  [[nodiscard]] Displacement displacement(const FeatureFrame& frame, TimeNs t_ns, const ImuMotion& motion,
+                                          const Ekf& ekf);
   /// The motion that it is of.
   [[nodiscard]] const std::optional<StereoMotion>& seen() const { return compared_.seen; }
 
@@ -74,9 +74,11 @@ class Cameras {
   void reset();
 
  private:
-  /// The frame at hand against the last image.
+  /// The frame at hand against one before: for displacement() the last that came, for all else the last that was used.
   struct Compared {
-    bool matched = false;              ///< matches_ holds the features of both
+    FeatureFrame before;               ///< that displacement() last saw,
+    TimeNs t_ns = 0;                   ///< at this IMU time
+    std::optional<TimeNs> matched_ns;  ///< stamp of the frame that matches_ holds the features of, and of this one
     std::optional<StereoMotion> seen;  ///< between these two
     bool agrees = true;                ///< most features were where the state expected them
   };
