@@ -5,8 +5,8 @@
 
 namespace ear::test {
 
-/// `value`, give or take `share` of it. doctest's Approx(value).epsilon(share) allows share of 1 + |value|: of something
-/// small it holds whatever comes out.
+/// `value`, give or take `share` of it. doctest's Approx(value).epsilon(share) allows share of 1 + |value|: of
+/// something small it holds whatever comes out.
 inline doctest::Approx about(double value, double share) { return doctest::Approx(value).epsilon(share).scale(0.0); }
 
 }  // namespace ear::test
