@@ -277,10 +277,10 @@ TEST_CASE("stream clock: inertial samples that are slower than the readings give
 }
 
 TEST_CASE("stream clock: what looked like a jump while the process stood still is put back") {
-  const TimeNs resumed = kJumpAt + 600 * kMs;
-  const Driver stalled = [resumed](TimeNs t) { return t >= kJumpAt && t < resumed ? TimeNs{-1} : t; };
+  constexpr TimeNs resumed = kJumpAt + 600 * kMs;
+  const Driver stalled = [](TimeNs t) { return t >= kJumpAt && t < resumed ? TimeNs{-1} : t; };
   // The first frames are read before the inertial samples that were queued with them.
-  const auto delay = [resumed](TimeNs t) {
+  const auto delay = [](TimeNs t) {
     return t >= resumed && t < resumed + 100 * kMs ? kJumpAt - t + 12 * kMs : 12 * kMs;
   };
   int jumps = -1;
