@@ -86,7 +86,7 @@ std::optional<Estimate> Filter::report(bool image, const FrameAgreement& seen) {
 void Filter::start(const FeatureFrame& frame) {
   const bool lost = ekf_.running();
   const TimeNs t_ns = imu_time(frame.t_ns, camera_state(calibration_));  // what was learned may be as wrong as the rest
-  Start::Situation now{frame, t_ns, sources_.standstill().recent(ingest_.imu(), t_ns)};
+  Start::Situation now{frame, t_ns, lost ? ImuStatistics{} : sources_.standstill().recent(ingest_.imu(), t_ns)};
   now.stands = sources_.standstill().stands();
   now.rolls = sources_.on_ground();
   now.restarts = lost || without_state_ == Status::lost;

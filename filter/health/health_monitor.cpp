@@ -103,7 +103,7 @@ void HealthMonitor::add_laser(const LaserSample& sample, Verdict verdict, const 
   const bool moves = health_.aiding != Aiding::standing;
   for (std::size_t beam = 0; beam < std::min(beams_, sample.range.size()); ++beam) {
     const double range = sample.range[beam];
-    no_return_[beam] = !(range >= lasers.range_min && range <= lasers.range_max);
+    no_return_[beam] = !is_return(range, lasers);
     if (verdict == Verdict::impossible || (stuck[beam] && moves && !no_return_[beam]))
       report({beam_source(beam)}, imu_ns);
   }

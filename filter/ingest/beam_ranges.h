@@ -13,13 +13,17 @@ namespace ear {
 /// The most laser beams that a vehicle may have.
 inline constexpr int kMaxBeams = 3;
 
+/// Is it a range, within its limits? Not NaN.
+[[nodiscard]] inline bool is_return(double range, const LaserCalibration& lasers) {
+  return range >= lasers.range_min && range <= lasers.range_max;
+}
+
 /// Ranges of one reading of the lasers [m]; NaN without return, and out of their limits.
 struct BeamRanges {
   BeamRanges() = default;
   BeamRanges(const LaserSample& sample, const LaserCalibration& lasers) : t_ns(sample.t_ns) {
     for (std::size_t i = 0; i < std::min(sample.range.size(), range.size()); ++i) {
-      const bool measured = sample.range[i] >= lasers.range_min && sample.range[i] <= lasers.range_max;
-      range[i] = measured ? sample.range[i] : std::numeric_limits<double>::quiet_NaN();
+      range[i] = is_return(sample.range[i], lasers) ? sample.range[i] : std::numeric_limits<double>::quiet_NaN();
     }
   }
 

@@ -86,7 +86,7 @@ GroundTracker::Sighting GroundTracker::update(const LaserSample& sample) {
 bool GroundTracker::usable(Beam& beam, double range) const {
   beam.same = range == beam.last ? beam.same + 1 : 1;
   beam.last = range;
-  return !beam.stuck() && range >= lasers_.range_min && range <= lasers_.range_max;
+  return !beam.stuck() && is_return(range, lasers_);
 }
 
 std::bitset<kMaxBeams> GroundTracker::stuck_beams() const {
