@@ -23,7 +23,9 @@ constexpr Limits kPossible = {};
 }  // namespace
 
 InputGuard::InputGuard(const Calibration& calibration, double max_imu_gap)
-    : max_imu_gap_(max_imu_gap), beam_count_(calibration.lasers ? calibration.lasers->beams.size() : 0) {
+    : max_imu_gap_(max_imu_gap),
+      stereo_(calibration.cameras.size() > 1),
+      beam_count_(calibration.lasers ? calibration.lasers->beams.size() : 0) {
   ids_.reserve(kFeatureCapacity);
   plausible_frame_.features.reserve(kFeatureCapacity);
 }
@@ -132,7 +134,7 @@ const FeatureFrame& InputGuard::plausible(const FeatureFrame& frame) {
     return std::abs(uv.x()) < kPossible.view && std::abs(uv.y()) < kPossible.view;
   };
   const auto possible = [&](const FeatureObservation& f) {
-    return visible(f.left) && (!f.has_right || visible(f.right));
+    return visible(f.left) && (!f.has_right || (stereo_ && visible(f.right)));
   };
   ids_.clear();
   for (const FeatureObservation& feature : frame.features) ids_.push_back(feature.id);

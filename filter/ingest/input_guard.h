@@ -38,7 +38,8 @@ class InputGuard {
   [[nodiscard]] Verdict judge(const EncoderSample& sample, std::optional<TimeNs> state_ns, EncoderReader& reader);
   [[nodiscard]] Verdict judge(const LaserSample& sample, std::optional<TimeNs> state_ns);
 
-  /// The frame without the features that cannot be; the frame itself if there are none. Valid until the next call.
+  /// The frame without the features that cannot be, such as one in a right image where there is one camera; the frame
+  /// itself if there are none. Valid until the next call.
   [[nodiscard]] const FeatureFrame& plausible(const FeatureFrame& frame);
 
   /// A reading whose stamp jumped, before it is known why.
@@ -57,6 +58,7 @@ class InputGuard {
                                  StreamCounts& counts) const;
 
   double max_imu_gap_;
+  bool stereo_;
   std::size_t beam_count_;
   InputCounts counts_;
   StampGuard imu_stamps_;

@@ -112,7 +112,7 @@ struct InputCounts {
   StreamCounts camera;            ///< frames; far_ahead: no inertial samples reach their time; gaps: longer than 0.25 s
   std::uint64_t imu_spikes = 0;   ///< of one to five samples, crossed by a line
   std::uint64_t clock_jumps = 0;  ///< of one sensor's clock against all others, which were taken out
-  std::uint64_t features_rejected = 0;  ///< not finite, outside any image, or twice in a frame
+  std::uint64_t features_rejected = 0;  ///< not finite, in no image that there is, or twice in a frame
   std::uint64_t steps_rejected = 0;     ///< calls of Odometry::step for a time not later than the state, or without IMU
 };
 

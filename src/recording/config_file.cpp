@@ -35,6 +35,9 @@ void load(const YamlMap& map, T& settings, std::vector<std::string> known = {}) 
     using Field = std::decay_t<decltype(field)>;
     if constexpr (std::is_arithmetic_v<Field>) {
       field = map.get<Field>(key);
+      if constexpr (!std::is_same_v<Field, bool>) {
+        if (field < 0) throw map.error(key, "must not be negative");
+      }
     } else if constexpr (std::is_enum_v<Field>) {
       field = load_choice<Field>(map, key);
     } else {

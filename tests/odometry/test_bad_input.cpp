@@ -169,6 +169,23 @@ TEST_CASE("bad input: features and the stamps of frames") {
   CHECK(with([](double, FeatureFrame&) { return 3; }) == 0);
 }
 
+TEST_CASE("bad input: one camera sees nothing in a right image") {
+  const auto rejected_with = [](std::size_t cameras) {
+    Calibration calibration = drive().calibration();
+    calibration.cameras.resize(cameras);
+    Filter filter(FilterConfig{}, calibration);
+    FeatureFrame frame{1'000'000'000, {}};
+    frame.features.resize(2);
+    frame.features[0].id = 1;
+    frame.features[1].has_right = true;
+    filter.add_imu({frame.t_ns, {}, {0.0, 0.0, 9.81}});
+    (void)filter.process(frame);
+    return filter.input_counts().features_rejected;
+  };
+  CHECK(rejected_with(2) == 0);
+  CHECK(rejected_with(1) == 1);
+}
+
 TEST_CASE("bad input: an accelerometer in units of g starts nothing") {
   Filter filter(FilterConfig{}, drive().calibration());
   Taps taps;

@@ -166,6 +166,7 @@ TEST_CASE("config: errors name file, line and key") {
   CHECK(contains(error("filter:\n  window: 7.5\n"), "a.yaml:2: filter.window: '7.5' is not a whole number"));
   CHECK(contains(error("filter:\n\n  huber_px: [1]\n"), "a.yaml:3: filter.huber_px: a list or map is not a number"));
   CHECK(contains(error("filter:\n  huber_px: .inf\n"), "a.yaml:2: filter.huber_px: '.inf' is not a finite number"));
+  CHECK(contains(error("filter:\n  prior:\n    axle: -1e-3\n"), "a.yaml:3: filter.prior.axle: must not be negative"));
   CHECK(contains(error("filter:\n  online_calibration:\n    time_offset: 3\n"),
                  "a.yaml:3: filter.online_calibration.time_offset: '3' is not true or false"));
   CHECK(contains(error("filter: 3\n"), "a.yaml:1: filter: keys and values expected"));
