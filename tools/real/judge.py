@@ -1,6 +1,7 @@
 """Estimates on recordings against their truth, as a table. The figures are those of docs/evaluation.md."""
 
 import json
+import re
 import subprocess
 
 # Where a truth is not the recording's state_groundtruth_estimate0: its file; and what its positions may be off by [m].
@@ -24,7 +25,10 @@ COLUMNS = [  # title, path in the JSON of `ear evaluate`, factor, decimals
     ("false tracking [%]", ["false_tracking", "percent"], 1, 1),
 ]
 
-ALARMS = ("alarms per hour", ["alarms_per_hour"], 1, 0)
+ALARMS = [
+    ("alarms per hour", ["alarms_per_hour"], 1, 0),
+    ("others than imprecise", ["accusations_per_hour"], 1, 0),
+]
 
 
 def truth_of(recording):
@@ -48,6 +52,29 @@ def judge(program, output, recording):
     return {**json.loads(done.stdout)["estimates"][0], "truth_error_m": error}
 
 
+def alarms(summary, figures):
+    """How often per hour the health left `tracking` while the position was not far off; and how often it then said more than
+    that the position is imprecise. Before its first `tracking` nothing counts."""
+    off = [(s["from_ns"], s["to_ns"]) for s in figures["false_tracking"]["stretches"]]
+    count, accusations, before = 0, 0, ""
+    for change in summary["health"]:
+        word = re.split("[:,]", change["is"])[0]
+        if before == "tracking" and word in ("degraded", "lost") and not any(a <= change["t_ns"] <= b for a, b in off):
+            count += 1
+            accusations += not change["is"].startswith("degraded: position imprecise;")
+        before = word
+    per_hour = 3600.0 / summary["duration_s"]
+    return {"alarms_per_hour": per_hour * count, "accusations_per_hour": per_hour * accusations}
+
+
+def judge_with_alarms(program, output, recording):
+    """As judge(), with those of alarms(). `output` is of `ear run`."""
+    figures = judge(program, output, recording)
+    if figures is None:
+        return None
+    return {**figures, **alarms(json.loads((output / "summary.json").read_text(encoding="utf-8")), figures)}
+
+
 def cell(figures, path, factor, decimals):
     for key in path:
         figures = figures.get(key) if figures else None
@@ -56,7 +83,7 @@ def cell(figures, path, factor, decimals):
 
 def table(judged):
     """Markdown; one row per pair of a name and its figures."""
-    columns = COLUMNS + [ALARMS] if any(figures and "alarms_per_hour" in figures for _, figures in judged) else COLUMNS
+    columns = COLUMNS + ALARMS if any(figures and "alarms_per_hour" in figures for _, figures in judged) else COLUMNS
     titles = ["recording", *(title for title, *_ in columns), "truth to [m]"]
     lines = ["| " + " | ".join(titles) + " |", "|---" * len(titles) + "|"]
     for name, figures in judged:
