@@ -50,8 +50,8 @@ ContactEvent ContactDetector::add_wheels(const WheelIncrement& increment) {
 
 ContactEvent ContactDetector::add_laser(const LaserSample& sample) {
   if (!ground_) return ContactEvent::none;
-  const GroundTracker::Sighting sighting = ground_->update(sample);
-  if (sighting.agreeing > 0) seen_ns_ = sample.t_ns;
+  const int agreeing = ground_->update(sample);
+  if (agreeing > 0) seen_ns_ = sample.t_ns;
   switch (mode_) {
     case ContactMode::unknown:
       if (lasts(height_known(), sample.t_ns, kLanding)) {
@@ -60,7 +60,7 @@ ContactEvent ContactDetector::add_laser(const LaserSample& sample) {
       }
       break;
     case ContactMode::ground:
-      if (lasts(airborne(sighting), sample.t_ns, config_.takeoff_duration))
+      if (lasts(airborne(agreeing), sample.t_ns, config_.takeoff_duration))
         return change(ContactMode::air, sample.t_ns);
       break;
     case ContactMode::air:
@@ -84,15 +84,14 @@ void ContactDetector::roll(const WheelIncrement& increment) {
   level_ = std::clamp(level, -config_.touchdown_height, config_.touchdown_height);
 }
 
-/// Every beam in use must see the ground below the wheels, and there must be two (one, where there is but one). Where
-/// not all agree, or the wheels rolled just now, the ground may be uneven.
-bool ContactDetector::airborne(const GroundTracker::Sighting& sighting) const {
-  const bool all = sighting.agreeing == ground_->beams();
+/// There must be two beams that agree (one, where there is but one). Where not all agree, or the wheels rolled just
+/// now, the ground may be uneven.
+bool ContactDetector::airborne(int agreeing) const {
+  const bool all = agreeing == ground_->beams();
   const double unknown = all ? std::min(1.0, recent_distance_ / kOtherGround) : 1.0;
   const double tolerance = config_.takeoff_height + config_.unevenness * unknown;
-  return sighting.agreeing >= std::min(2, ground_->beams()) &&
-         ground_->height() - 2.0 * ground_->height_sigma() > level_ + tolerance &&
-         sighting.lowest_lift > level_ + 0.5 * config_.takeoff_height;
+  return agreeing >= std::min(2, ground_->beams()) &&
+         ground_->height() - 2.0 * ground_->height_sigma() > level_ + tolerance;
 }
 
 bool ContactDetector::stands() const {

@@ -54,7 +54,7 @@ class ContactDetector {
   ContactEvent look_for_strike(TimeNs t_ns);
   [[nodiscard]] bool lasts(bool holds, TimeNs t_ns, double duration);
   [[nodiscard]] bool height_known() const;
-  [[nodiscard]] bool airborne(const GroundTracker::Sighting& sighting) const;
+  [[nodiscard]] bool airborne(int agreeing) const;
   [[nodiscard]] bool stands() const;
   void roll(const WheelIncrement& increment);
 

@@ -57,29 +57,24 @@ void GroundTracker::suppose_height(double level, double sigma) {
   if (passes(H, level - height(), sigma * sigma, kReturnGate)) update(H, level - height(), sigma * sigma);
 }
 
-GroundTracker::Sighting GroundTracker::update(const LaserSample& sample) {
+int GroundTracker::update(const LaserSample& sample) {
   const double dt = last_ns_ ? seconds_between(*last_ns_, sample.t_ns) : 0.0;
   last_ns_ = sample.t_ns;
   if (dt < 0.0 || dt > kStale) forget();
   predict(std::max(0.0, dt));
 
-  Sighting sighting;
-  int readings = 0;  // beams with a return
-  const Eigen::Vector3d before_B = n_B();
+  int readings = 0, agreeing = 0;  // beams with a return
   const std::size_t count = std::min(lasers_.beams.size(), sample.range.size());
   for (std::size_t i = 0; i < count; ++i) {
     if (!usable(beams_[i], sample.range[i])) continue;
     ++readings;
     const Eigen::Vector3d hit_B = lasers_.beams[i].p_BL + sample.range[i] * lasers_.beams[i].d_B - p_BO_;
-    if (!update_with_hit(beams_[i], lasers_.beams[i].d_B, hit_B)) continue;
-    const double lift = -before_B.dot(hit_B) - radius_;
-    sighting.lowest_lift = sighting.agreeing == 0 ? lift : std::min(sighting.lowest_lift, lift);
-    ++sighting.agreeing;
+    if (update_with_hit(beams_[i], lasers_.beams[i].d_B, hit_B)) ++agreeing;
   }
-  if (sighting.agreeing > 0) lost_ = 0;
-  if (sighting.agreeing == 0 && readings >= 2) ++lost_;
+  if (agreeing > 0) lost_ = 0;
+  if (agreeing == 0 && readings >= 2) ++lost_;
   if (lost_ >= kConfirmed || (!up_B_.isZero() && n_B().dot(up_B_) < std::cos(kSteepest))) forget();
-  return sighting;
+  return agreeing;
 }
 
 /// A return that is not always the same: noise makes each reading of a working beam another one.

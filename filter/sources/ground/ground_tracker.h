@@ -37,13 +37,8 @@ class GroundTracker {
   /// contradict it.
   void suppose_height(double level, double sigma);
 
-  /// How one reading of the beams agreed with the plane tracked so far.
-  struct Sighting {
-    int agreeing = 0;          ///< those that passed the gate and updated the plane
-    double lowest_lift = 0.0;  ///< smallest height that one of those sees, with the normal tracked so far [m]
-  };
-  /// Readings in time order.
-  Sighting update(const LaserSample& sample);
+  /// Readings in time order. How many beams agreed with the plane tracked so far, and updated it.
+  int update(const LaserSample& sample);
 
   /// Beams that give the same range again and again.
   [[nodiscard]] std::bitset<kMaxBeams> stuck_beams() const;
