@@ -58,7 +58,7 @@ const char* to_text(Reason reason) {
     case Reason::images_contradict:
       return "the images do not show what the state expects";
     case Reason::not_a_number:
-      return "the state is not a number";
+      return "the state is not a number, or farther away than any vehicle gets";
     case Reason::clock_or_gap:
       return "no inertial samples for two seconds, or their clock was set back";
     case Reason::proving:

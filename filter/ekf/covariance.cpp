@@ -57,6 +57,17 @@ void Covariance::propagate(const ErrorTransition& transition, const Eigen::Matri
   P.topRightCorner(n, rest) = P.bottomLeftCorner(rest, n).transpose();
 }
 
+void Covariance::add_scale_effect(const ScaleEffect& effect, const Eigen::Matrix<double, 3, 2>& B) {
+  constexpr int n = err::normal + 2;
+  Eigen::Matrix<double, n, 3> J = Eigen::Matrix<double, n, 3>::Zero();
+  J.topRows<9>() = effect;
+  J.bottomRows<2>() = -B.transpose() * effect.topRows<3>();  // the normal stays in the world
+  auto P = P_.topLeftCorner(size_, size_);
+  for (int column = 0; column < size_; ++column)
+    P.col(column).head<n>() += J * P.col(column).segment<3>(err::gyro_scale);
+  P.leftCols<n>() += P.middleCols<3>(err::gyro_scale).lazyProduct(J.transpose());
+}
+
 void Covariance::restart(int first, const Eigen::Ref<const Eigen::VectorXd>& sigma) {
   const auto count = sigma.size();
   P_.block(first, 0, count, size_).setZero();

@@ -26,6 +26,9 @@ class Covariance {
   /// have turned meanwhile, each axis.
   void propagate(const ErrorTransition& transition, const Eigen::Matrix<double, 3, 2>& B, double normal_variance);
 
+  /// What the scales of the gyroscope did to the inertial part meanwhile, after propagate(). `B` as there.
+  void add_scale_effect(const ScaleEffect& effect, const Eigen::Matrix<double, 3, 2>& B);
+
   /// Makes the `sigma.size()` entries from `first` on unknown anew: these standard deviations, no correlations.
   void restart(int first, const Eigen::Ref<const Eigen::VectorXd>& sigma);
 

@@ -4,6 +4,7 @@
 
 #include "filter/ekf/initial_state.h"
 #include "filter/ekf/propagation.h"
+#include "filter/ingest/limits.h"
 
 namespace ear {
 namespace {
@@ -28,6 +29,7 @@ Ekf::Ekf(const FilterConfig& config, const Calibration& calibration)
 void Ekf::start(const ImuState& x, const Eigen::VectorXd& sigma, bool scale_is_given) {
   running_ = true;
   state_.imu = x;
+  started_ns_ = x.t_ns;
   started_W_ = x.p_WB;
   rate_B_.setZero();
   turned_ = 0.0;
@@ -81,6 +83,7 @@ std::optional<TimeNs> Ekf::propagate(const ImuBuffer& samples, TimeNs t_ns, cons
   std::optional<TimeNs> uncertain_ns;
   if (t_ns <= state_.imu.t_ns) return uncertain_ns;
   std::optional<ErrorTransition> total;
+  ScaleEffect scale_effect = ScaleEffect::Zero();
   const double duration = seconds_between(state_.imu.t_ns, t_ns);
   samples.for_each_piece(
       state_.imu.t_ns, t_ns,
@@ -90,6 +93,7 @@ std::optional<TimeNs> Ekf::propagate(const ImuBuffer& samples, TimeNs t_ns, cons
         if (factors.gyro * calibration_.imu.gyro_noise * std::sqrt(dt) > kUncertainTurn && !uncertain_ns)
           uncertain_ns = state_.imu.t_ns;
         const ErrorTransition step = error_transition(state_.imu, gyro_B, accel_B, dt, noise);
+        if (calibration_.cameras.empty()) chain(scale_effect, step, state_.imu, gyro_B);
         if (total) {
           chain(kernels_, *total, step);
         } else {
@@ -102,8 +106,9 @@ std::optional<TimeNs> Ekf::propagate(const ImuBuffer& samples, TimeNs t_ns, cons
       });
   state_.imu.t_ns = t_ns;
   const double distance = state_.imu.v_W.norm() * duration;
-  covariance_.propagate(total.value_or(ErrorTransition{}), tangent_basis(state_.ground.n_W),
-                        normal_walk * normal_walk * distance);
+  const Eigen::Matrix<double, 3, 2> B = tangent_basis(state_.ground.n_W);
+  covariance_.propagate(total.value_or(ErrorTransition{}), B, normal_walk * normal_walk * distance);
+  if (calibration_.cameras.empty()) covariance_.add_scale_effect(scale_effect, B);
   return uncertain_ns;
 }
 
@@ -118,7 +123,8 @@ void Ekf::apply(GroundRows& z, double weight, CameraUpdate calibration) {
 
 void Ekf::apply(const Eigen::Ref<const Eigen::MatrixXd>& H, int first_column,
                 const Eigen::Ref<const Eigen::VectorXd>& r, CameraUpdate calibration) {
-  const int considered = calibration == CameraUpdate::learned ? 0 : err::calibration_size;
+  const bool learned = calibration == CameraUpdate::learned && !calibration_.cameras.empty();
+  const int considered = learned ? 0 : err::calibration_size;
   const auto variance = [this] { return covariance_.matrix().diagonal().segment<6>(err::b_g); };
   const BiasChanges::Vector6 before = variance();
   const Eigen::Ref<const Eigen::VectorXd> correction = covariance_.update(H, first_column, r, err::camera, considered);
@@ -185,7 +191,9 @@ bool Ekf::possible() const {
                       o.wheel_radius.allFinite() && std::isfinite(o.track_width) && o.T_BO.R.allFinite() &&
                       o.T_BO.p.allFinite() && o.beam_offset.allFinite() && state_.ground.n_W.allFinite() &&
                       P.topLeftCorner<err::imu_size, err::imu_size>().allFinite() && P.diagonal().allFinite();
-  return finite && P.diagonal().minCoeff() >= 0.0;
+  const double reach = kFastest * (kLostAfter + seconds_between(started_ns_, x.t_ns));
+  return finite && P.diagonal().minCoeff() >= 0.0 && (x.p_WB - started_W_).norm() < reach &&
+         P.diagonal().segment<3>(err::rho).maxCoeff() < reach * reach;
 }
 
 /// From the invariant error to the ordinary one: dv = nu - [v]x theta, dp = rho - [p]x theta. Larger wheels make

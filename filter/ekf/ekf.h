@@ -17,7 +17,8 @@
 
 namespace ear {
 
-/// What an update does to the calibration of the cameras.
+/// What an update does to the calibration of the cameras. Without any, err::gyro_scale stands in its place, and is
+/// always considered.
 enum class CameraUpdate : std::uint8_t {
   learned,    ///< it is corrected as everything else
   considered  ///< its uncertainty counts, its value stays (Schmidt-Kalman): this measurement shows nothing of it
@@ -96,7 +97,8 @@ class Ekf {
   [[nodiscard]] const Gate& gate() const { return gate_; }
   /// Mean rate of the last piece integrated, bias removed [rad/s].
   [[nodiscard]] const Eigen::Vector3d& rate_B() const { return rate_B_; }
-  /// Are the state and its covariance numbers, and no variance negative?
+  /// Are the state and its covariance numbers, no variance negative, and is the vehicle where it can be: no farther
+  /// from its start than the fastest one gets, and known to as much?
   [[nodiscard]] bool possible() const;
   /// Covariance of the ordinary errors (estimate_error), with what the scales that nothing measures do to them.
   [[nodiscard]] ImuErrorMatrix ordinary_covariance(const UnseenScales& scales) const;
@@ -115,6 +117,7 @@ class Ekf {
   Eigen::Vector3d rate_B_ = Eigen::Vector3d::Zero();
   std::uint64_t next_frame_ = 0;
   BiasChanges bias_changes_;
+  TimeNs started_ns_ = 0;
   Eigen::Vector3d started_W_ = Eigen::Vector3d::Zero();  ///< [m] here
   // Since the start: what one unit of the gyroscope's scale does to yaw [rad] and, turned by a right angle, to
   // position.

@@ -105,4 +105,12 @@ void chain(const FilterKernels& kernels, ErrorTransition& total, const ErrorTran
   carry(total.Phi);
 }
 
+void chain(ScaleEffect& total, const ErrorTransition& step, const ImuState& x, const Eigen::Vector3d& gyro_B) {
+  const Eigen::Vector3d up_B = x.R_WB.row(2);
+  const Eigen::Vector3d rate_B = gyro_B - x.b_g;
+  const Eigen::Vector3d tilting_B = rate_B - rate_B.dot(up_B) * up_B;
+  total = (step.Phi.topLeftCorner<9, 9>() * total).eval() -
+          step.Phi.block<9, 3>(err::theta, err::b_g) * tilting_B.asDiagonal();
+}
+
 }  // namespace ear

@@ -61,4 +61,12 @@ struct BodyMotion {
 /// `total` followed by `step`.
 void chain(const FilterKernels& kernels, ErrorTransition& total, const ErrorTransition& step);
 
+/// What errors of the gyroscope's scales, one of each axis (true rate = (1 + scale) measured rate), do to (theta, nu,
+/// rho).
+using ScaleEffect = Eigen::Matrix<double, 9, 3>;
+
+/// `total` followed by `step` from `x` on, with the measured rate `gyro_B` [rad/s]. Only turns that tilt the body
+/// count.
+void chain(ScaleEffect& total, const ErrorTransition& step, const ImuState& x, const Eigen::Vector3d& gyro_B);
+
 }  // namespace ear

@@ -38,6 +38,7 @@ inline constexpr int lens_size = 3;
 [[nodiscard]] constexpr int lens(int index) { return lenses + lens_size * index; }
 inline constexpr int time_offset = lenses + 2 * lens_size;  ///< [s]
 inline constexpr int calibration_size = 19;
+inline constexpr int gyro_scale = lenses;  ///< where there is no camera: of each axis of the gyroscope, considered: 3
 inline constexpr int clones = camera + calibration_size;
 inline constexpr int clone_size = 6;  ///< theta, rho
 [[nodiscard]] constexpr int clone(int index) { return clones + clone_size * index; }

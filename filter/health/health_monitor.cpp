@@ -11,7 +11,6 @@ constexpr double kWorstVelocity = 1.0;   // [m/s] chosen: standard deviation of 
 constexpr double kWorstDirection = 0.2;  // [rad] chosen: or of its direction, if more; a fast one may be less exact
 constexpr double kPrecise = 0.05;       // chosen: of the path: two standard deviations of the position, while tracking,
 constexpr double kPreciseEnough = 0.1;  // [m] chosen: or this, if more
-constexpr double kFastest = 100.0;      // [m/s] chosen: no vehicle with wheels and rotors is faster
 
 constexpr int kWheelQuality = 40;     // chosen: of 100; Health::quality
 constexpr int kTrackQuality = 2;      // chosen: for each feature

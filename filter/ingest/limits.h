@@ -25,6 +25,8 @@ inline constexpr double kSilent = 0.12;
 /// How long a sensor may be silent [s] that usually delivers every `interval` seconds; 0: not known.
 [[nodiscard]] inline double longest_silence(double interval) { return std::max(kSilent, kMissed * interval); }
 
+inline constexpr double kFastest = 100.0;  ///< [m/s] chosen: no vehicle with wheels and rotors is faster
+
 // ---- Evidence
 
 /// [s] chosen: of what a regression is made of, of an interval, which a crystal keeps, and of how late stamps are.

@@ -39,7 +39,7 @@ enum class Reason : std::uint8_t {
   inertia_alone,      ///< nothing but inertial samples for two seconds
   velocity_lost,      ///< the velocity's standard deviation is too large
   images_contradict,  ///< for a second, images do not show what the state expects, and no wheels agree with it
-  not_a_number,       ///< the state or its covariance is not finite, or has a negative variance
+  not_a_number,       ///< the state or its covariance is not finite or cannot be: a negative variance, too far away
   clock_or_gap,       ///< two seconds without inertial samples, or their clock was set back
   proving             ///< what is measured fits again, but not yet for half a second
 };

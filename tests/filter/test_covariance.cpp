@@ -78,6 +78,19 @@ TEST_CASE("covariance: propagation and cloning are the full matrix products") {
   CHECK((P.matrix() - (Phi * cloned * Phi.transpose() + Q)).norm() < 1e-12);
 }
 
+TEST_CASE("covariance: what the gyroscope's scales did is the full matrix product") {
+  std::mt19937_64 rng{36};
+  Covariance P = filled(rng);
+  const Eigen::MatrixXd before = P.matrix();
+  const ScaleEffect effect = random_matrix(rng, 9, 3);
+  const Eigen::Matrix<double, 3, 2> B = tangent_basis(Eigen::Vector3d(0.2, 0.3, 0.9).normalized());
+  P.add_scale_effect(effect, B);
+  Eigen::MatrixXd J = Eigen::MatrixXd::Identity(P.size(), P.size());
+  J.block<9, 3>(0, err::gyro_scale) = effect;
+  J.block<2, 3>(err::normal, err::gyro_scale) = -B.transpose() * effect.topRows<3>();  // it stays in the world
+  CHECK((P.matrix() - J * before * J.transpose()).norm() < 1e-12 * before.norm());
+}
+
 TEST_CASE("covariance: removing takes out rows and columns, and nothing else") {
   std::mt19937_64 rng{32};
   Covariance P = filled(rng);

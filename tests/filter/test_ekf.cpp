@@ -131,6 +131,27 @@ TEST_CASE("ekf: what is no number never passes") {
   CHECK(ekf.possible());
 }
 
+TEST_CASE("ekf: no vehicle is farther from its start than the fastest one gets") {
+  Ekf ekf = started();
+  const State x = ekf.state();
+  const Eigen::MatrixXd P = ekf.covariance().matrix();
+  const auto possible = [&](double distance, double sigma, double later) {
+    State there = x;
+    there.imu.p_WB.x() += distance;
+    there.imu.t_ns += static_cast<TimeNs>(1e9 * later);
+    Eigen::MatrixXd vague = P;
+    vague(err::rho + 1, err::rho + 1) = sigma * sigma;
+    ekf.assume(there, vague);
+    return ekf.possible();
+  };
+  CHECK(possible(0.0, 0.1, 0.0));
+  CHECK(possible(190.0, 190.0, 0.0));  // what stamps and updates may be off by at the start
+  CHECK_FALSE(possible(210.0, 0.1, 0.0));
+  CHECK_FALSE(possible(0.0, 210.0, 0.0));
+  CHECK(possible(900.0, 900.0, 8.0));
+  CHECK_FALSE(possible(1100.0, 0.1, 8.0));
+}
+
 TEST_CASE("ekf: a weight divides the noise of a row: R / w^2") {
   Ekf weighted = started(), noisy = started();
   GroundRows z = velocity_row(0.1, 0.05);
