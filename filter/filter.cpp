@@ -71,7 +71,7 @@ void Filter::watch_biases() {
 std::optional<Estimate> Filter::report(bool image, const FrameAgreement& seen) {
   UnseenScales scales;
   scales.length = start_.scale_is_given() ? config_.prior.wheel_scale : sources_.cameras().scale_sigma();
-  if (calibration_.cameras.empty()) scales.turn = config_.prior.gyro_scale;
+  if (calibration_.cameras.empty()) scales.turn = config_.prior.gyro_unseen;
   const std::optional<Estimate> estimate = make_estimate(sources_.ground().known(), scales);
   const HealthMonitor::Frame frame = health_frame(image, seen, estimate);
   health_.add_frame(frame, records_.log.records());

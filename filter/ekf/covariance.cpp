@@ -31,10 +31,10 @@ void Covariance::reset(const Eigen::VectorXd& sigma) {
   P_.topLeftCorner(size_, size_).diagonal() = sigma.cwiseAbs2();
 }
 
-void Covariance::propagate(const ErrorTransition& transition, const Eigen::Matrix<double, 3, 2>& B,
-                           double normal_variance) {
+void Covariance::propagate(const ErrorTransition& transition, const ScaleEffect& scales,
+                           const Eigen::Matrix<double, 3, 2>& B, double normal_variance) {
   // delta + B^T theta is the normal's error in the world, which motion does not touch. So delta changes by -B^T times
-  // what theta does: a part of the gyroscope's bias, and noise.
+  // what theta does: a part of the gyroscope's bias and scales, and noise.
   constexpr int n = err::normal + 2;  // what changes
   const Eigen::Matrix<double, 3, 2> gyro_to_normal = -transition.Phi.block<3, 3>(err::theta, err::b_g).transpose() * B;
   const auto carry = [&](auto& M) {
@@ -43,8 +43,16 @@ void Covariance::propagate(const ErrorTransition& transition, const Eigen::Matri
   };
   auto P = P_.topLeftCorner(size_, size_);
   carry(P);
+  Eigen::Matrix<double, 3, n> by_scales = Eigen::Matrix<double, 3, n>::Zero();
+  by_scales.leftCols<9>() = scales.transpose();
+  by_scales.rightCols<2>() = -scales.topRows<3>().transpose() * B;
+  for (int column = 0; column < n; ++column) {
+    if (column >= err::b_g && column < err::normal) continue;  // they do nothing to the biases
+    P.col(column).noalias() += P.middleCols<3>(err::gyro_scale).lazyProduct(by_scales.col(column));
+  }
   Eigen::Matrix<double, n, n> corner = P.topLeftCorner<n, n>().transpose();
   carry(corner);
+  corner.noalias() += P.block<3, n>(err::gyro_scale, 0).transpose().lazyProduct(by_scales);
   corner.topLeftCorner<err::imu_size, err::imu_size>() += transition.Q;
   const Eigen::Matrix<double, 2, 3> to_normal = -B.transpose();
   const Eigen::Matrix<double, 2, err::imu_size> normal_Q = to_normal * transition.Q.topRows<3>();
@@ -55,17 +63,6 @@ void Covariance::propagate(const ErrorTransition& transition, const Eigen::Matri
   P.topLeftCorner<n, n>() = 0.5 * (corner + corner.transpose());
   const int rest = size_ - n;
   P.topRightCorner(n, rest) = P.bottomLeftCorner(rest, n).transpose();
-}
-
-void Covariance::add_scale_effect(const ScaleEffect& effect, const Eigen::Matrix<double, 3, 2>& B) {
-  constexpr int n = err::normal + 2;
-  Eigen::Matrix<double, n, 3> J = Eigen::Matrix<double, n, 3>::Zero();
-  J.topRows<9>() = effect;
-  J.bottomRows<2>() = -B.transpose() * effect.topRows<3>();  // the normal stays in the world
-  auto P = P_.topLeftCorner(size_, size_);
-  for (int column = 0; column < size_; ++column)
-    P.col(column).head<n>() += J * P.col(column).segment<3>(err::gyro_scale);
-  P.leftCols<n>() += P.middleCols<3>(err::gyro_scale).lazyProduct(J.transpose());
 }
 
 void Covariance::restart(int first, const Eigen::Ref<const Eigen::VectorXd>& sigma) {

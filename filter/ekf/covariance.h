@@ -22,12 +22,10 @@ class Covariance {
   [[nodiscard]] Eigen::Block<const Eigen::MatrixXd> matrix() const { return P_.topLeftCorner(size_, size_); }
 
   /// The inertial part moves on; all else stays where it is in the world. So does the ground's normal, whose error is
-  /// counted from that of the body's rotation; `B`: its tangent basis. `normal_variance` [rad^2]: what the ground may
-  /// have turned meanwhile, each axis.
-  void propagate(const ErrorTransition& transition, const Eigen::Matrix<double, 3, 2>& B, double normal_variance);
-
-  /// What the scales of the gyroscope did to the inertial part meanwhile, after propagate(). `B` as there.
-  void add_scale_effect(const ScaleEffect& effect, const Eigen::Matrix<double, 3, 2>& B);
+  /// counted from that of the body's rotation; `B`: its tangent basis. `scales`: of the gyroscope, what their errors do
+  /// meanwhile. `normal_variance` [rad^2]: what the ground may have turned, each axis.
+  void propagate(const ErrorTransition& transition, const ScaleEffect& scales, const Eigen::Matrix<double, 3, 2>& B,
+                 double normal_variance);
 
   /// Makes the `sigma.size()` entries from `first` on unknown anew: these standard deviations, no correlations.
   void restart(int first, const Eigen::Ref<const Eigen::VectorXd>& sigma);

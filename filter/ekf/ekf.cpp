@@ -93,22 +93,23 @@ std::optional<TimeNs> Ekf::propagate(const ImuBuffer& samples, TimeNs t_ns, cons
         if (factors.gyro * calibration_.imu.gyro_noise * std::sqrt(dt) > kUncertainTurn && !uncertain_ns)
           uncertain_ns = state_.imu.t_ns;
         const ErrorTransition step = error_transition(state_.imu, gyro_B, accel_B, dt, noise);
-        if (calibration_.cameras.empty()) chain(scale_effect, step, state_.imu, gyro_B);
+        // Wheels alone, whose track width is a guess, would teach it the wrong way about the vertical.
+        const Eigen::Vector3d measured_B = gyro_B - state_.imu.b_g;
+        chain(scale_effect, step, calibration_.cameras.empty() ? tilting(state_.imu.R_WB, measured_B) : measured_B);
         if (total) {
           chain(kernels_, *total, step);
         } else {
           total = step;
         }
-        rate_B_ = gyro_B - state_.imu.b_g;
+        rate_B_ = state_.imu.rate_B(gyro_B);
         turned_ += state_.imu.R_WB.row(2).dot(rate_B_) * dt;
         turned_path_ += turned_ * dt * state_.imu.v_W;
         state_.imu = integrate(state_.imu, gyro_B, accel_B, dt);
       });
   state_.imu.t_ns = t_ns;
   const double distance = state_.imu.v_W.norm() * duration;
-  const Eigen::Matrix<double, 3, 2> B = tangent_basis(state_.ground.n_W);
-  covariance_.propagate(total.value_or(ErrorTransition{}), B, normal_walk * normal_walk * distance);
-  if (calibration_.cameras.empty()) covariance_.add_scale_effect(scale_effect, B);
+  covariance_.propagate(total.value_or(ErrorTransition{}), scale_effect, tangent_basis(state_.ground.n_W),
+                        normal_walk * normal_walk * distance);
   return uncertain_ns;
 }
 

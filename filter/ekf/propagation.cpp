@@ -6,7 +6,7 @@
 namespace ear {
 
 ImuState integrate(const ImuState& x, const Eigen::Vector3d& gyro_B, const Eigen::Vector3d& accel_B, double dt) {
-  const Eigen::Vector3d phi = (gyro_B - x.b_g) * dt;
+  const Eigen::Vector3d phi = x.rate_B(gyro_B) * dt;
   const Eigen::Vector3d f_B = accel_B - x.b_a;
   ImuState next = x;
   next.R_WB = renormalized(x.R_WB * exp_so3(phi));
@@ -32,7 +32,7 @@ BodyMotion motion_at(TimeNs t_ns, const ImuState& x, const ImuBuffer& samples) {
   Eigen::Vector3d gained = Eigen::Vector3d::Zero();      // velocity, in the body then, without gravity
   samples.for_each_piece(t_ns, x.t_ns, [&](const Eigen::Vector3d& gyro_B, const Eigen::Vector3d& accel_B, double dt) {
     gained += turned * (accel_B - x.b_a) * dt;
-    turned *= exp_so3((gyro_B - x.b_g) * dt);
+    turned *= exp_so3(x.rate_B(gyro_B) * dt);
   });
   motion.R_WB = x.R_WB * turned.transpose();
   motion.v_W = x.v_W - kGravity_W * seconds_between(t_ns, x.t_ns) - motion.R_WB * gained;
@@ -56,19 +56,20 @@ NavState nav_state(const ImuState& x) {
 
 ErrorTransition error_transition(const ImuState& x, const Eigen::Vector3d& gyro_B, const Eigen::Vector3d& accel_B,
                                  double dt, const ImuCalibration& noise) {
-  const Eigen::Vector3d phi = (gyro_B - x.b_g) * dt;
+  const Eigen::Vector3d phi = x.rate_B(gyro_B) * dt;
   const Eigen::Vector3d f_B = accel_B - x.b_a;
   const Eigen::Matrix3d G1 = gamma<1>(phi);
   const Eigen::Matrix3d G2 = gamma<2>(phi);
   const Eigen::Vector3d v_next = x.v_W + kGravity_W * dt + x.R_WB * (G1 * f_B) * dt;
   const Eigen::Vector3d p_next = x.p_WB + x.v_W * dt + 0.5 * kGravity_W * dt * dt + x.R_WB * (G2 * f_B) * dt * dt;
 
-  // What an error of the rate, and one of the force, each constant over dt, does to (theta, nu, rho).
+  // What an error of the gyroscope, and one of the accelerometer, each constant over dt, does to (theta, nu, rho).
   Eigen::Matrix<double, 9, 3> B_gyro;
   B_gyro.topRows<3>() = -x.R_WB * G1 * dt;
   B_gyro.middleRows<3>(3) = -x.R_WB * gamma_derivative<1>(phi, f_B) * (dt * dt) + skew(v_next) * B_gyro.topRows<3>();
   B_gyro.bottomRows<3>() =
       -x.R_WB * gamma_derivative<2>(phi, f_B) * (dt * dt * dt) + skew(p_next) * B_gyro.topRows<3>();
+  B_gyro *= x.gyro_scale.asDiagonal();
   Eigen::Matrix<double, 9, 3> B_accel;
   B_accel.topRows<3>().setZero();
   B_accel.middleRows<3>(3) = -x.R_WB * G1 * dt;
@@ -105,12 +106,14 @@ void chain(const FilterKernels& kernels, ErrorTransition& total, const ErrorTran
   carry(total.Phi);
 }
 
-void chain(ScaleEffect& total, const ErrorTransition& step, const ImuState& x, const Eigen::Vector3d& gyro_B) {
-  const Eigen::Vector3d up_B = x.R_WB.row(2);
-  const Eigen::Vector3d rate_B = gyro_B - x.b_g;
-  const Eigen::Vector3d tilting_B = rate_B - rate_B.dot(up_B) * up_B;
+void chain(ScaleEffect& total, const ErrorTransition& step, const Eigen::Vector3d& measured_B) {
   total = (step.Phi.topLeftCorner<9, 9>() * total).eval() -
-          step.Phi.block<9, 3>(err::theta, err::b_g) * tilting_B.asDiagonal();
+          step.Phi.block<9, 3>(err::theta, err::b_g) * measured_B.asDiagonal();
+}
+
+Eigen::Vector3d tilting(const Eigen::Matrix3d& R_WB, const Eigen::Vector3d& rate_B) {
+  const Eigen::Vector3d up_B = R_WB.row(2);
+  return rate_B - rate_B.dot(up_B) * up_B;
 }
 
 }  // namespace ear

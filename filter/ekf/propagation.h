@@ -61,12 +61,14 @@ struct BodyMotion {
 /// `total` followed by `step`.
 void chain(const FilterKernels& kernels, ErrorTransition& total, const ErrorTransition& step);
 
-/// What errors of the gyroscope's scales, one of each axis (true rate = (1 + scale) measured rate), do to (theta, nu,
-/// rho).
+/// What errors of the gyroscope's scales do to (theta, nu, rho).
 using ScaleEffect = Eigen::Matrix<double, 9, 3>;
 
-/// `total` followed by `step` from `x` on, with the measured rate `gyro_B` [rad/s]. Only turns that tilt the body
-/// count.
-void chain(ScaleEffect& total, const ErrorTransition& step, const ImuState& x, const Eigen::Vector3d& gyro_B);
+/// `total` followed by `step`, in which the gyroscope measures `measured_B` without its bias [rad/s], or as much of it
+/// as is to count.
+void chain(ScaleEffect& total, const ErrorTransition& step, const Eigen::Vector3d& measured_B);
+
+/// The part of a rate that tilts the body: without what turns it about the vertical.
+[[nodiscard]] Eigen::Vector3d tilting(const Eigen::Matrix3d& R_WB, const Eigen::Vector3d& rate_B);
 
 }  // namespace ear

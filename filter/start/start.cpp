@@ -209,7 +209,7 @@ Eigen::VectorXd Start::sigma() const {
       sigma.segment<3>(err::stereo + 3) = (by_target.square() + prior.stereo_position * prior.stereo_position).sqrt();
     }
   }
-  if (calibration_.cameras.empty()) sigma.segment<3>(err::gyro_scale).setConstant(prior.gyro_scale);
+  sigma.segment<3>(err::gyro_scale).setConstant(calibration_.cameras.empty() ? prior.gyro_unseen : prior.gyro_scale);
   for (std::size_t i = 0; online.intrinsics && i < calibration_.cameras.size(); ++i) {
     sigma.segment<err::lens_size>(err::lens(static_cast<int>(i))) = lens_sigma(prior, calibration_.cameras[i]);
   }

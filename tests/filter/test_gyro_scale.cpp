@@ -104,10 +104,10 @@ double yaw(const Estimate& estimate) {
 TEST_CASE("gyroscope's scale: its share of the covariance is what it does to attitude, velocity and position") {
   FilterConfig config;
   config.odometer.yaw_rate_sigma = 100.0;  // the wheels do not show the turn
-  const double sigma = config.prior.gyro_scale;
+  const double sigma = config.prior.gyro_unseen;
   REQUIRE(sigma > 0.0);
   FilterConfig sure = config;
-  sure.prior.gyro_scale = 0.0;
+  sure.prior.gyro_unseen = 0.0;
   const Estimate right = drive(0.0, config);
   const auto share = (right.covariance - drive(0.0, sure).covariance).eval();
 
@@ -138,7 +138,7 @@ TEST_CASE("gyroscope's scale: on a ramp the wheels are believed, not the tilt th
   CHECK(believed.accused == 0.0);
   CHECK(believed.worst < 0.05);
   FilterConfig sure = config;
-  sure.prior.gyro_scale = 0.0;
+  sure.prior.gyro_unseen = 0.0;
   const Ramp accused = drive_over_ramp(sure);
   CHECK(accused.accused > 2.0);
   CHECK(accused.worst > 0.1);

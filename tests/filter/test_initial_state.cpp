@@ -54,6 +54,7 @@ TEST_CASE("initial state: what is stated replaces the prior, the rest stays") {
   CHECK(prior.gyro_bias == 0.016);
   CHECK(prior.accel_bias == 0.017);
   CHECK(prior.gyro_scale == 0.022);
+  CHECK(prior.gyro_unseen == 0.022);
   for (const double rotation : {prior.odometer_rotation, prior.odometer_unseen}) CHECK(rotation == 0.018);
   for (const double position : {prior.axle, prior.axle_unseen}) CHECK(position == 0.019);
   CHECK(prior.wheel_scale == doctest::Approx(0.01));

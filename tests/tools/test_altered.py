@@ -72,6 +72,7 @@ class Hop(unittest.TestCase):
         "imu_noise": 0.03,
         "imu_means": 0.02,
         "camera_third": 0.02,
+        "gyro_scale": 0.01,  # 22 mm where the scale is no state
         "wheels_exchanged": 0.02,
         "imu_very_late": None,  # too wrong for an estimate, and the health knows it
         "cameras_exchanged": None,

@@ -179,6 +179,7 @@ ALTERATIONS = [
     Alteration("imu_noise", "white noise of 0.05 rad/s and 0.5 m/s^2 on each sample", noisy_imu),
     Alteration("gyro_bias", "gyroscope's bias of 0.05 rad/s in roll and yaw",
                on(["imu0"], each_value((1, 3), lambda x, column: x + (0.05 if column == 3 else -0.05)))),
+    Alteration("gyro_scale", "gyroscope that measures 1 % too much", on(["imu0"], each_value(GYRO, lambda x, _: 1.01 * x))),
     Alteration("accel_bias", "accelerometer's bias of 0.7 m/s^2 in x and y, nine times what the prior allows",
                on(["imu0"], each_value((4, 5), lambda x, column: x + (0.7 if column == 4 else -0.7)))),
     Alteration("gyro_degrees", "gyroscope in degrees per second", on(["imu0"], each_value(GYRO, lambda x, _: 57.29578 * x))),

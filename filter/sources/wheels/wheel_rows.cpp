@@ -17,7 +17,7 @@ WheelRows linearize_wheels(const State& x, const Eigen::Matrix3d& R_WB, const Ei
   const bool terrain = model == OdometerModel::terrain;
   const bool on_plane = terrain && normal_known;
   const Eigen::Matrix3d& R_BO = odometer.T_BO.R;
-  const Vector3d rate = gyro_B - x.imu.b_g;
+  const Vector3d rate = x.imu.rate_B(gyro_B);
   const Vector3d v_O = R_WB.transpose() * v_W + rate.cross(odometer.T_BO.p);
   const Vector3d y = R_BO.col(1);
   const Vector3d n = on_plane ? Vector3d(R_WB.transpose() * x.ground.n_W) : Vector3d(R_BO.col(2));
@@ -53,6 +53,7 @@ WheelRows linearize_wheels(const State& x, const Eigen::Matrix3d& R_WB, const Ei
   rows.J_gyro.topRows<3>() = rows.direction * v_rate;
   rows.J_gyro.row(WheelRows::yaw_rate) = n.transpose();
   if (terrain) rows.J_gyro.row(WheelRows::speed) -= r * y.transpose();
+  rows.J_gyro *= x.imu.gyro_scale.asDiagonal();
 
   auto& H = rows.H;
   H.middleCols<3>(nu).topRows<3>() = rows.direction * R_WB.transpose();

@@ -62,7 +62,7 @@ Wheels::Sigmas Wheels::noise_of(const WheelRows& rows, const WheelIncrement& inc
                                 const State& x) const {
   const double dt = increment.duration();
   const double per_root_metre = std::sqrt(std::abs(rows.wheel_speed) / dt);
-  const double yaw_rate = (rate.gyro_B - x.imu.b_g).norm();
+  const double yaw_rate = x.imu.rate_B(rate.gyro_B).norm();
   const double gyro_noise = rate.noise_factor * imu_.gyro_noise / std::sqrt(dt);
   const double count_noise = std::sqrt(2.0) * encoder_.noise_counts * 2.0 * M_PI /
                              static_cast<double>(encoder_.resolution) / dt * x.odometer.wheel_radius.mean() /
@@ -142,7 +142,7 @@ Displacement Wheels::displacement(const Ekf& ekf, const WheelIncrements& increme
   if (!complete || to_ns <= whole.from_ns || (uses_plane() && !ground_known)) return result;
   const double dt = whole.duration();
   const MeanRate rate = imu.mean_rate(whole.from_ns, to_ns);
-  const Eigen::Matrix3d R_half = exp_so3(0.5 * dt * (rate.gyro_B - x.imu.b_g));
+  const Eigen::Matrix3d R_half = exp_so3(0.5 * dt * x.imu.rate_B(rate.gyro_B));
   const Eigen::Matrix3d R_WB = x.imu.R_WB * R_half;
   const auto rows_at = [&](const Eigen::Vector3d& v_B) {
     return linearize_wheels(x, R_WB, R_WB * v_B, whole, rate.gyro_B, config_.model, sees_ground_);
