@@ -19,6 +19,15 @@ constexpr double kTrack = 0.4;
 
 TimeNs stamp(double t) { return 1'000'000'000 + static_cast<TimeNs>(std::llround(1e9 * t)); }
 
+Calibration two_wheels() {
+  Calibration calibration;
+  EncoderCalibration& axle = calibration.encoder.emplace();
+  axle.wraps = false;
+  axle.wheel_radius = {kRadius, kRadius};
+  axle.track_width = kTrack;
+  return calibration;
+}
+
 /// Stands for two seconds, then drives in the plane: left turns of changing rate, with a turn to the right in between.
 double speed(double t) { return t < 2.0 ? 0.0 : 0.8 * (1.0 - std::exp(-(t - 2.0))); }
 double acceleration(double t) { return t < 2.0 ? 0.0 : 0.8 * std::exp(-(t - 2.0)); }
@@ -26,11 +35,7 @@ double yaw_rate(double t) { return t < 3.0 ? 0.0 : 0.25 + 0.35 * std::sin(0.3 * 
 
 /// At the end, with a gyroscope that measures (1 + `scale`) times the rate.
 Estimate drive(double scale, const FilterConfig& config) {
-  Calibration calibration;
-  EncoderCalibration& axle = calibration.encoder.emplace();
-  axle.wraps = false;
-  axle.wheel_radius = {kRadius, kRadius};
-  axle.track_width = kTrack;
+  const Calibration calibration = two_wheels();
   Filter filter(config, calibration);
   std::optional<Estimate> last;
   double left = 0.0, right = 0.0;  // [m] rolled
@@ -41,7 +46,7 @@ Estimate drive(double scale, const FilterConfig& config) {
         {stamp(t), {0.0, 0.0, (1.0 + scale) * yaw_rate(t)}, {acceleration(t), speed(t) * yaw_rate(t), 9.81}});
     const auto counts = [&](double metres) {
       return static_cast<std::int64_t>(
-          std::llround(metres / (2.0 * M_PI * kRadius) * static_cast<double>(axle.resolution)));
+          std::llround(metres / (2.0 * M_PI * kRadius) * static_cast<double>(calibration.encoder->resolution)));
     };
     filter.add_encoder({stamp(t), counts(left), counts(right)});
     if (k % 5 == 0) last = filter.process_without_image(stamp(t));
@@ -66,11 +71,7 @@ struct Ramp {
 };
 
 Ramp drive_over_ramp(const FilterConfig& config) {
-  Calibration calibration;
-  EncoderCalibration& axle = calibration.encoder.emplace();
-  axle.wraps = false;
-  axle.wheel_radius = {kRadius, kRadius};
-  axle.track_width = kTrack;
+  const Calibration calibration = two_wheels();
   Filter filter(config, calibration);
   Ramp result;
   double rolled = 0.0;  // [m] of each wheel against the body
@@ -80,8 +81,8 @@ Ramp drive_over_ramp(const FilterConfig& config) {
     const Eigen::Vector3d force_B(acceleration(t) - 9.81 * std::sin(pitch(t)), 0.0,
                                   9.81 * std::cos(pitch(t)) - speed(t) * rate);
     filter.add_imu({stamp(t), {0.0, 0.92 * rate, 0.0}, force_B});
-    const auto count =
-        static_cast<std::int64_t>(std::llround(rolled / (2.0 * M_PI * kRadius) * static_cast<double>(axle.resolution)));
+    const auto count = static_cast<std::int64_t>(
+        std::llround(rolled / (2.0 * M_PI * kRadius) * static_cast<double>(calibration.encoder->resolution)));
     filter.add_encoder({stamp(t), count, count});
     rolled += kStep * speed(t + 0.5 * kStep) - kRadius * (pitch(t + kStep) - pitch(t));
     if (k % 5 != 0) continue;
