@@ -93,7 +93,8 @@ std::optional<TimeNs> Ekf::propagate(const ImuBuffer& samples, TimeNs t_ns, cons
         if (factors.gyro * calibration_.imu.gyro_noise * std::sqrt(dt) > kUncertainTurn && !uncertain_ns)
           uncertain_ns = state_.imu.t_ns;
         const ErrorTransition step = error_transition(state_.imu, gyro_B, accel_B, dt, noise);
-        // Wheels alone, whose track width is a guess, would teach it the wrong way about the vertical.
+        // Without a camera turns about the vertical are left out: the heading would follow wheels whose track width is
+        // a guess.
         const Eigen::Vector3d measured_B = gyro_B - state_.imu.b_g;
         chain(scale_effect, step, calibration_.cameras.empty() ? tilting(state_.imu.R_WB, measured_B) : measured_B);
         if (total) {

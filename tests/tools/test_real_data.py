@@ -385,6 +385,7 @@ class Tool(RealData):
                 (55, "tracking"), (65, "degraded: without left wheel; carried by wheels"), (80, "tracking"), (90, "lost: velocity")]
         summary = {"duration_s": 1800.0, "health": [{"t_ns": t, "is": text} for t, text in said]}
         self.assertEqual(judge.alarms(summary, figures), {"alarms_per_hour": 6.0, "accusations_per_hour": 4.0})
+        self.assertEqual(judge.alarms({**summary, "duration_s": 0.0}, figures), {"alarms_per_hour": 0.0, "accusations_per_hour": 0.0})
 
     def test_a_real_recording(self):
         if not (CLIPS / "comma2k19").exists():

@@ -63,7 +63,7 @@ def alarms(summary, figures):
             count += 1
             accusations += not change["is"].startswith("degraded: position imprecise;")
         before = word
-    per_hour = 3600.0 / summary["duration_s"]
+    per_hour = 3600.0 / summary["duration_s"] if summary["duration_s"] > 0 else 0.0
     return {"alarms_per_hour": per_hour * count, "accusations_per_hour": per_hour * accusations}
 
 

@@ -20,9 +20,8 @@ This page is written by `tools/real_data report`; do not edit it.
 The figures are defined in [evaluation.md](evaluation.md), *far off* and *false tracking* in [its section](evaluation.md#false-tracking); positions are
 aligned over the whole path for the ATE, over the first pose for NEES, and over the first two seconds for the rest. *Alarms per hour*: how often the health
 left `tracking` for `degraded` or `lost` while the position was not far off, over the recording's length; *others than imprecise*: those that say more than
-that the position is known to less than 5 % of the path. The sensors are taken for sound, so these count as false alarms; where they are not, the notes say so.
-One alarm in 20 s makes 180 per hour. *Truth to*: smaller errors are not judged. "-": no estimate, or no
-such truth.
+that the position is less certain than 5 % of the path. The sensors are taken for sound, so these count as false alarms; where they are not, the notes say so.
+One alarm in 20 s makes 180 per hour. *Truth to*: smaller errors are not judged. "-": no estimate, or no such truth.
 """
 
 
