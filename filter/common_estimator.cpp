@@ -80,10 +80,10 @@ void CommonEstimator::take_imu() {
       continue;
     }
     if (verdict.begins_anew) restart(sample->t_ns, verdict.clock_shift);
-    health_.add_imu(sample->t_ns, config_.max_imu_gap);
+    health_.add_imu(sample->t_ns, verdict);
     const std::optional<TimeNs> due_ns = ingest_.imu_due();
     if (due_ns && ekf_.running()) make_room(*due_ns);
-    health_.report_imu_fault(ingest_.store(*sample), sample->t_ns);
+    health_.report_imu_fault(ingest_.store(*sample, verdict), sample->t_ns);
     note(sources_.watch_contact(ingest_.imu().newest(), ekf_));
   }
   const bool corrected = ingest_.imu_clock().take_correction();

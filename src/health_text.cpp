@@ -36,7 +36,7 @@ const char* to_text(Reason reason) {
     case Reason::few_readings:
       return "it rolls, and the readings of the wheels do not span 1.5 s yet";
     case Reason::wheel_gaps:
-      return "it rolls, and readings of the wheels are missing, or more than 0.25 s apart";
+      return "it rolls, and readings of the wheels are missing, or too far apart";
     case Reason::wheels_contradict:
       return "it rolls, and wheels and inertial samples show different motions";
     case Reason::few_frames:

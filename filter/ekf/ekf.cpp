@@ -13,6 +13,9 @@ constexpr double kUncertainTurn = 5e-3;  // [rad] chosen: standard deviation of 
 
 int error_capacity(const FilterConfig& config) { return err::clone(config.window + 1); }
 
+/// Factor on the stated noise: what a sample has beyond it comes to the usual noise, whatever that is.
+double excess(double of_sample, double usual) { return std::sqrt(usual * usual + of_sample * of_sample - 1.0); }
+
 }  // namespace
 
 Ekf::Ekf(const FilterConfig& config, const Calibration& calibration)
@@ -31,7 +34,7 @@ void Ekf::start(const ImuState& x, const Eigen::VectorXd& sigma, bool scale_is_g
   state_.imu = x;
   started_ns_ = x.t_ns;
   started_W_ = x.p_WB;
-  rate_B_.setZero();
+  last_ = {};
   turned_ = 0.0;
   turned_path_.setZero();
   covariance_.reset(sigma);
@@ -89,7 +92,7 @@ std::optional<TimeNs> Ekf::propagate(const ImuBuffer& samples, TimeNs t_ns, cons
       state_.imu.t_ns, t_ns,
       [&](const Eigen::Vector3d& gyro_B, const Eigen::Vector3d& accel_B, double dt, const ImuNoiseFactors& factors) {
         const ImuCalibration noise =
-            with_factors(calibration_.imu, {factors.gyro * usual.gyro, factors.accel * usual.accel});
+            with_factors(calibration_.imu, {excess(factors.gyro, usual.gyro), excess(factors.accel, usual.accel)});
         if (factors.gyro * calibration_.imu.gyro_noise * std::sqrt(dt) > kUncertainTurn && !uncertain_ns)
           uncertain_ns = state_.imu.t_ns;
         const ErrorTransition step = error_transition(state_.imu, gyro_B, accel_B, dt, noise);
@@ -102,10 +105,12 @@ std::optional<TimeNs> Ekf::propagate(const ImuBuffer& samples, TimeNs t_ns, cons
         } else {
           total = step;
         }
-        rate_B_ = state_.imu.rate_B(gyro_B);
-        turned_ += state_.imu.R_WB.row(2).dot(rate_B_) * dt;
+        last_.rate_B = state_.imu.rate_B(gyro_B);
+        turned_ += state_.imu.R_WB.row(2).dot(last_.rate_B) * dt;
         turned_path_ += turned_ * dt * state_.imu.v_W;
+        const Eigen::Vector3d before_W = state_.imu.v_W;
         state_.imu = integrate(state_.imu, gyro_B, accel_B, dt);
+        last_.accel_W = (state_.imu.v_W - before_W) / dt;
       });
   state_.imu.t_ns = t_ns;
   const double distance = state_.imu.v_W.norm() * duration;
@@ -138,7 +143,7 @@ void Ekf::apply(const Eigen::Ref<const Eigen::MatrixXd>& H, int first_column,
 /// If the frame was taken a moment later than its stamp, the vehicle moved on: this is how the time offset is seen.
 void Ekf::clone(double feature_noise) {
   const ImuState& x = state_.imu;
-  const Eigen::Vector3d rate_W = x.R_WB * rate_B_;
+  const Eigen::Vector3d rate_W = x.R_WB * last_.rate_B;
   Eigen::Matrix<double, 6, 1> J_offset;
   J_offset << rate_W, x.v_W + x.p_WB.cross(rate_W);
   covariance_.append_clone(J_offset);
@@ -158,6 +163,15 @@ void Ekf::inflate_motion(double rotation, double velocity, double position) {
   Q.diagonal().segment<3>(err::nu).array() += velocity * velocity;
   Q.diagonal().segment<3>(err::rho).array() += position * position;
   covariance_.inflate(err::theta, Q);
+}
+
+/// One unknown for all of it, along what the state does.
+void Ekf::inflate_time(double seconds) {
+  const ImuState& x = state_.imu;
+  const Eigen::Vector3d rate_W = x.R_WB * last_.rate_B;
+  Eigen::Matrix<double, 9, 1> J;
+  J << rate_W, last_.accel_W + x.v_W.cross(rate_W), x.v_W + x.p_WB.cross(rate_W);
+  covariance_.inflate(err::theta, Eigen::Matrix<double, 9, 9>(seconds * seconds * J * J.transpose()));
 }
 
 void Ekf::inflate_biases(double gyro, double accel) {

@@ -82,6 +82,8 @@ class Ekf {
   /// The vehicle may be turned, faster and elsewhere by these standard deviations [rad, m/s, m], each axis, whatever
   /// was measured so far.
   void inflate_motion(double rotation, double velocity, double position);
+  /// By that of the time that passed [s].
+  void inflate_time(double seconds);
   /// The biases may be elsewhere: gyroscope [rad/s], accelerometer [m/s^2].
   void inflate_biases(double gyro, double accel);
   /// The ground's normal is this one, and as little known as before the lasers saw it.
@@ -96,7 +98,7 @@ class Ekf {
   [[nodiscard]] const Covariance& covariance() const { return covariance_; }
   [[nodiscard]] const Gate& gate() const { return gate_; }
   /// Mean rate of the last piece integrated, bias and scale corrected [rad/s].
-  [[nodiscard]] const Eigen::Vector3d& rate_B() const { return rate_B_; }
+  [[nodiscard]] const Eigen::Vector3d& rate_B() const { return last_.rate_B; }
   /// Are the state and its covariance numbers, no variance negative, and is the vehicle where it can be: no farther
   /// from its start than the fastest one gets, and known to as much?
   [[nodiscard]] bool possible() const;
@@ -114,7 +116,11 @@ class Ekf {
   bool running_ = false;
   State state_;
   Covariance covariance_;
-  Eigen::Vector3d rate_B_ = Eigen::Vector3d::Zero();
+  /// Of the last piece integrated, its means.
+  struct {
+    Eigen::Vector3d rate_B = Eigen::Vector3d::Zero();   ///< [rad/s]
+    Eigen::Vector3d accel_W = Eigen::Vector3d::Zero();  ///< [m/s^2]
+  } last_;
   std::uint64_t next_frame_ = 0;
   BiasChanges bias_changes_;
   TimeNs started_ns_ = 0;

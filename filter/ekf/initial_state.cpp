@@ -116,7 +116,6 @@ const Calibration& checked(const Calibration& calibration) {
 /// standard deviation of one.
 FilterConfig settings_for(const FilterConfig& config, const Calibration& calibration) {
   FilterConfig result = config;
-  result.max_imu_gap = std::max(config.max_imu_gap, kMissed / calibration.imu.rate_hz);
   PriorConfig& prior = result.prior;
   const auto state_pose = [](const std::optional<PoseSigma>& sigma, double& rotation, double& position) {
     if (!sigma) return;

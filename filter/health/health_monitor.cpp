@@ -71,11 +71,11 @@ void HealthMonitor::add_refused_imu() {
   decide(*arrivals_.imu_ns);
 }
 
-void HealthMonitor::add_imu(TimeNs t_ns, double max_gap) {
-  if (arrivals_.imu_ns && seconds_between(*arrivals_.imu_ns, t_ns) > max_gap) {
-    report({Source::gyroscope, Source::accelerometer}, t_ns);
-  }
+void HealthMonitor::add_imu(TimeNs t_ns, const ImuVerdict& verdict) {
+  const bool lost = verdict.gap || verdict.refused > 0.0;
+  if (lost && arrivals_.imu_ns) report({Source::gyroscope, Source::accelerometer}, t_ns);
   arrivals_.imu_ns = t_ns;
+  images_.hear_imu(t_ns, lost || verdict.lost > 0);
   note_silence(t_ns);
 }
 
@@ -108,15 +108,9 @@ void HealthMonitor::add_laser(const LaserSample& sample, Verdict verdict, const 
   }
 }
 
-/// Whose clock is wrong? Where the inertial samples went on since the last refusal, it is not theirs.
+/// Whose clock is wrong? Where the inertial samples do not go on, it is theirs.
 void HealthMonitor::add_refused_frame(TimeNs imu_ns) {
-  const bool imu_goes_on = arrivals_.refused_imu_ns && imu_ns > *arrivals_.refused_imu_ns;
-  arrivals_.refused_imu_ns = imu_ns;
-  if (imu_goes_on) {
-    images_.report(imu_ns);
-  } else {
-    report({Source::gyroscope, Source::accelerometer}, imu_ns);
-  }
+  if (!images_.add_ahead()) report({Source::gyroscope, Source::accelerometer}, imu_ns);
   decide(imu_ns);
 }
 
@@ -147,9 +141,8 @@ void HealthMonitor::add_frame(const Frame& frame, const std::array<SourceRecord,
     now.wheel_rows_used = before.statistics.wheel_rows_used;
     now.wheel_rows_rejected = before.statistics.wheel_rows_rejected;
   }
-  arrivals_.refused_imu_ns.reset();
   if (frame.image) {
-    images_.add(t_ns, arrivals_.imu_ns.value_or(t_ns), frame.running, frame.agreement, frame.statistics);
+    images_.add(t_ns, frame.running, frame.agreement, frame.statistics);
   }
   if (wheels_) judge_ground(frame, records);
   for (const Source source : {Source::gyroscope, Source::accelerometer}) {

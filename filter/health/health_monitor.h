@@ -26,7 +26,7 @@ class HealthMonitor {
   void succeed(const HealthMonitor& before, TimeNs t_ns);
 
   /// The stamp of a sample as it comes, before it is used.
-  void add_imu(TimeNs t_ns, double max_gap);
+  void add_imu(TimeNs t_ns, const ImuVerdict& verdict);
   /// One whose stamp or values cannot be.
   void add_refused_imu();
   /// What only a fault of the sensor does: a spike, a clipped value, a bias that jumps.
@@ -43,7 +43,7 @@ class HealthMonitor {
 
   /// May this image be used? See ImageHealth::check.
   [[nodiscard]] bool check_image(const FrameAgreement& agreement, TimeNs t_ns) {
-    return images_.check(agreement, t_ns, arrivals_.imu_ns.value_or(t_ns));
+    return images_.check(agreement, t_ns);
   }
 
   /// What is known after a frame was used.
@@ -89,7 +89,6 @@ class HealthMonitor {
   /// Stamps [ns] of what came last.
   struct Arrivals {
     std::optional<TimeNs> imu_ns;
-    std::optional<TimeNs> refused_imu_ns;        ///< the newest inertial one at the last refused frame
     std::optional<TimeNs> encoder_ns, laser_ns;  ///< newest inertial stamp when they came
     std::optional<TimeNs> wheel_rows_ns;         ///< of the last frame for which the wheels measured something
     double encoder_interval = 0.0;               ///< [s] between the last two

@@ -18,37 +18,48 @@ bool crossed(const FrameAgreement& seen) { return seen.behind > kMajority; }
 
 }  // namespace
 
-bool StampWatch::add(TimeNs stamp_ns, TimeNs imu_ns) {
-  const double passed = std::clamp(seconds_between(last_imu_ns_, imu_ns) / kSlopeMemory, 0.0, 1.0);
+void StampWatch::add(TimeNs stamp_ns) {
+  const TimeNs imu_ns = imu_ns_.value_or(stamp_ns);
+  const double passed = std::clamp(seconds_between(came_ns_, imu_ns) / kSlopeMemory, 0.0, 1.0);
   const double share = std::max(passed, 1.0 / (count_ + 1));
-  last_imu_ns_ = imu_ns;
+  came_ns_ = imu_ns;
   const double off = seconds_between(imu_ns, stamp_ns) - usual_;
-  const bool unusual = count_ >= kToKnow && std::abs(off) > std::max(kClockJump, kClear * std::sqrt(variance_));
+  const double limit = std::max(kClockJump, kClear * std::sqrt(variance_)) + imu_step_;
+  unusual_ = count_ >= kToKnow && std::abs(off) > limit;
+  if (unusual_ && stamp_ns > imu_ns) add_ahead();
   const double counted = std::clamp(off, -kClockJump, kClockJump);  // what is usual changes slowly
   usual_ += share * counted;
   variance_ += share * (counted * counted - variance_);
   ++count_;
-  return unusual;
 }
 
-bool ImageHealth::check(const FrameAgreement& seen, TimeNs t_ns, TimeNs newest_imu_ns) {
-  stamps_unusual_ = stamps_.add(t_ns, newest_imu_ns);
+bool StampWatch::add_imu(TimeNs t_ns, bool after_loss) {
+  imu_step_ = imu_ns_ ? seconds_between(*imu_ns_, t_ns) : 0.0;
+  imu_ns_ = t_ns;
+  return !std::exchange(ahead_, false) || after_loss;
+}
+
+bool ImageHealth::check(const FrameAgreement& seen, TimeNs t_ns) {
+  stamps_.add(t_ns);
   const bool elsewhere = seen.matches > 0 && seen.left > kMajority;
-  stamps_wrong_ = stamps_unusual_ && (stamps_wrong_ || elsewhere);
+  stamps_wrong_ = stamps_.unusual() && (stamps_wrong_ || elsewhere);
   return !seen.frozen && !crossed(seen) && !stamps_wrong_;
 }
 
-void ImageHealth::add(TimeNs t_ns, TimeNs newest_imu_ns, bool running, const FrameAgreement& seen,
-                      const FrameStatistics& statistics) {
+void ImageHealth::add(TimeNs t_ns, bool running, const FrameAgreement& seen, const FrameStatistics& statistics) {
   if (arrival_ns_) {
     const double interval = std::min(seconds_between(last_ns_, t_ns), kStale);
     interval_ += (interval_ == 0.0 ? 1.0 : 1.0 / kToKnow) * (interval - interval_);
   }
   last_ns_ = t_ns;
-  arrival_ns_ = std::max(t_ns, newest_imu_ns);
+  arrival_ns_ = std::max(t_ns, stamps_.newest_imu().value_or(t_ns));
   if (cameras_ > 0) judge(t_ns, running, seen, statistics);
-  late_ = stamps_unusual_ && !stamps_wrong_ && seen.matches > 0 && seen.left < kMajority;
-  if (stamps_unusual_) report(t_ns);
+  late_ = stamps_.unusual() && !stamps_wrong_ && seen.matches > 0 && seen.left < kMajority;
+  if (stamps_.late()) report(t_ns);
+}
+
+void ImageHealth::hear_imu(TimeNs t_ns, bool after_loss) {
+  if (!stamps_.add_imu(t_ns, after_loss)) report(t_ns);
 }
 
 void ImageHealth::judge(TimeNs t_ns, bool running, const FrameAgreement& seen, const FrameStatistics& statistics) {

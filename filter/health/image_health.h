@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <utility>
 
 #include "ear/estimate.h"
 #include "ear/types.h"
@@ -13,11 +14,25 @@ namespace ear {
 /// By how much a sensor's stamps are off those of the inertial samples, against what is usual.
 class StampWatch {
  public:
-  /// A stamp, and that of the newest inertial sample. Is the difference an unusual one?
-  bool add(TimeNs stamp_ns, TimeNs imu_ns);
+  /// A stamp of the sensor. It is unusual if it differs from the newest inertial one by more than is usual; when this
+  /// one came is known to within the interval before it.
+  void add(TimeNs stamp_ns);
+  /// A reading came that is far ahead of the inertial samples. False: the second one since the last of these.
+  bool add_ahead() { return !std::exchange(ahead_, true); }
+  /// An inertial sample; `after_loss`: others were lost before it. False: none were, and a reading was ahead.
+  [[nodiscard]] bool add_imu(TimeNs t_ns, bool after_loss);
+
+  [[nodiscard]] bool unusual() const { return unusual_; }
+  /// Unusual, and behind.
+  [[nodiscard]] bool late() const { return unusual_ && !ahead_; }
+  [[nodiscard]] std::optional<TimeNs> newest_imu() const { return imu_ns_; }
 
  private:
-  TimeNs last_imu_ns_ = 0;
+  std::optional<TimeNs> imu_ns_;  ///< the newest inertial sample
+  double imu_step_ = 0.0;         ///< [s] since the one before
+  bool ahead_ = false;            ///< a reading was, since then
+  bool unusual_ = false;          ///< the last reading
+  TimeNs came_ns_ = 0;            ///< it, by the inertial samples
   int count_ = 0;
   double usual_ = 0.0;     ///< [s]
   double variance_ = 0.0;  ///< [s^2] of the distance from it
@@ -32,11 +47,14 @@ class ImageHealth {
 
   /// Whether an image may be used, by how it agrees with what the state and the other sensors expect of it: not one
   /// that repeats the last, not left and right exchanged, not one with a stamp that jumped; a late one is right.
-  [[nodiscard]] bool check(const FrameAgreement& seen, TimeNs t_ns, TimeNs newest_imu_ns);
+  [[nodiscard]] bool check(const FrameAgreement& seen, TimeNs t_ns);
 
   /// An image at `t_ns`, after it was used or not. `running`: there is a state.
-  void add(TimeNs t_ns, TimeNs newest_imu_ns, bool running, const FrameAgreement& seen,
-           const FrameStatistics& statistics);
+  void add(TimeNs t_ns, bool running, const FrameAgreement& seen, const FrameStatistics& statistics);
+  /// An image came too far ahead of the inertial samples to be used. False: the second one since the last of these.
+  bool add_ahead() { return stamps_.add_ahead(); }
+  /// An inertial sample, which shows whether an image was ahead, or `after_loss`: of other samples.
+  void hear_imu(TimeNs t_ns, bool after_loss);
   /// No image came for too long.
   void add_silence(TimeNs t_ns);
   /// Something that never happens to sound cameras.
@@ -59,7 +77,6 @@ class ImageHealth {
   FaultState left_, right_;
   FaultState carrying_;  ///< less strict
   StampWatch stamps_;
-  bool stamps_unusual_ = false;
   bool stamps_wrong_ = false;
   bool late_ = false;                 ///< the last image came late, and fits
   TimeNs last_ns_ = 0;                ///< of the images

@@ -58,16 +58,15 @@ bool ExcessWatch::clipped(const Eigen::Vector3d& value) {
 
 /// No body turns so suddenly: all of a deviation of the rate may be wrong. The mean follows what bodies do to within
 /// that.
-ImpactGuard::ImpactGuard(const ImpactConfig& config, const ImuCalibration& imu)
+ImpactGuard::ImpactGuard(const ImpactConfig& config)
     : gyro_(config.gyro_range, config.gyro_deviation, config.gyro_deviation / kTurnRate, 1.0),
-      accel_(config.accel_range, config.accel_deviation, kStreamGap, kAccelShare),
-      sigma_(imu) {}
+      accel_(config.accel_range, config.accel_deviation, kStreamGap, kAccelShare) {}
 
-ImuNoiseFactors ImpactGuard::add(const ImuSample& sample) {
+ImuNoiseFactors ImpactGuard::add(const ImuSample& sample, const SampleSigma& sigma) {
   const double dt = last_ns_ ? seconds_between(*last_ns_, sample.t_ns) : 0.0;
   last_ns_ = sample.t_ns;
-  return {std::hypot(1.0, gyro_.add(sample.gyro_B, dt) / sigma_.gyro),
-          std::hypot(1.0, accel_.add(sample.accel_B, dt) / sigma_.accel)};
+  return {std::hypot(1.0, gyro_.add(sample.gyro_B, dt) / sigma.gyro),
+          std::hypot(1.0, accel_.add(sample.accel_B, dt) / sigma.accel)};
 }
 
 }  // namespace ear

@@ -16,10 +16,10 @@ namespace ear {
 /// [rad/s^2] chosen: no body turns more suddenly; a multirotor of 1.5 kg, 15 N on one side at 0.15 m.
 inline constexpr double kTurnRate = 100.0;
 
-/// Standard deviations of a sample's white noise.
+/// Standard deviations of a sample's white noise: the density over the root of the samples' interval [s].
 struct SampleSigma {
-  explicit SampleSigma(const ImuCalibration& imu)
-      : gyro(imu.gyro_noise * std::sqrt(imu.rate_hz)), accel(imu.accel_noise * std::sqrt(imu.rate_hz)) {}
+  SampleSigma(const ImuCalibration& imu, double interval)
+      : gyro(imu.gyro_noise / std::sqrt(interval)), accel(imu.accel_noise / std::sqrt(interval)) {}
 
   double gyro;   ///< [rad/s]
   double accel;  ///< [m/s^2]
@@ -53,17 +53,16 @@ class ExcessWatch {
 
 class ImpactGuard {
  public:
-  ImpactGuard(const ImpactConfig& config, const ImuCalibration& imu);
+  explicit ImpactGuard(const ImpactConfig& config);
 
   /// Samples in time order, finite, as the sensor gives them. Whoever integrates over the piece between two samples
   /// takes the larger factor.
-  ImuNoiseFactors add(const ImuSample& sample);
+  ImuNoiseFactors add(const ImuSample& sample, const SampleSigma& sigma);
   [[nodiscard]] bool gyro_clips() const { return gyro_.clips(); }  ///< the last sample
   [[nodiscard]] bool accel_clips() const { return accel_.clips(); }
 
  private:
   ExcessWatch gyro_, accel_;
-  SampleSigma sigma_;
   std::optional<TimeNs> last_ns_;
 };
 

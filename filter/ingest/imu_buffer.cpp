@@ -40,8 +40,12 @@ ImuSample ImuBuffer::interpolate(std::size_t next, TimeNs t_ns) const {
   return result;
 }
 
-ImuNoiseFactors ImuBuffer::noise_around(std::size_t next) const {
+ImuNoiseFactors ImuBuffer::noise_around(std::size_t next, TimeNs to_ns) const {
   const ImuNoiseFactors& a = entries_[next == 0 ? 0 : std::min(next, size()) - 1].noise;
+  if (next >= size()) {
+    const double held = seconds_between(newest().t_ns, to_ns);
+    return {std::max(a.gyro, walk_.gyro * held), std::max(a.accel, walk_.accel * held)};
+  }
   const ImuNoiseFactors& b = entries_[std::min(next, size() - 1)].noise;
   return {std::max(a.gyro, b.gyro), std::max(a.accel, b.accel)};
 }

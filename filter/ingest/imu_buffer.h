@@ -47,6 +47,8 @@ class ImuBuffer {
   explicit ImuBuffer(std::size_t capacity) : entries_(capacity) {}
 
   void push(const ImuSample& sample, const ImuNoiseFactors& noise = {});
+  /// What holding the newest sample's values for a second would make of the factors: so much changes meanwhile.
+  void set_walk(const ImuNoiseFactors& per_second) { walk_ = per_second; }
   /// The sample that so many came after, to correct it: its stamp stays.
   [[nodiscard]] Entry& entry(std::size_t age) { return entries_[size() - 1 - age]; }
 
@@ -76,7 +78,7 @@ class ImuBuffer {
       const Eigen::Vector3d accel_B = 0.5 * (start.accel_B + end.accel_B);
       const double dt = seconds_between(start.t_ns, end.t_ns);
       if constexpr (std::is_invocable_v<Function, Eigen::Vector3d, Eigen::Vector3d, double, ImuNoiseFactors>) {
-        f(gyro_B, accel_B, dt, noise_around(next));
+        f(gyro_B, accel_B, dt, noise_around(next, end.t_ns));
       } else {
         f(gyro_B, accel_B, dt);
       }
@@ -91,10 +93,11 @@ class ImuBuffer {
   /// The value at t_ns, which lies between samples next - 1 and next.
   [[nodiscard]] ImuSample interpolate(std::size_t next, TimeNs t_ns) const;
 
-  /// Of the samples before and at `next`, the larger.
-  [[nodiscard]] ImuNoiseFactors noise_around(std::size_t next) const;
+  /// Of the samples before and at `next`, the larger; after the last one, of what holding it until `to_ns` adds.
+  [[nodiscard]] ImuNoiseFactors noise_around(std::size_t next, TimeNs to_ns) const;
 
   Ring<Entry> entries_;
+  ImuNoiseFactors walk_{0.0, 0.0};
 };
 
 }  // namespace ear

@@ -9,7 +9,7 @@
 namespace ear {
 namespace {
 
-constexpr int kVotes = 2;  // chosen: readings, for a verdict: one may have a false stamp
+constexpr int kVotes = 2;  // chosen: readings of one sensor, for a verdict: one may have a false stamp
 
 }  // namespace
 
@@ -28,6 +28,16 @@ bool ImuClock::others_show(double step) const {
   return any;
 }
 
+/// Time passed if several readings of one sensor came meanwhile, or one in the middle. If all clocks jumped, one
+/// reading may come before the first inertial sample, but with a stamp of then.
+bool ImuClock::others_went_on(double step) const {
+  return std::any_of(others_.begin(), others_.end(), [&](const Other& other) {
+    if (other.readings == 0) return false;
+    const double came = seconds_between(*last_ns_ - shift_ns_, *other.newest_ns) - other.ahead;
+    return other.readings >= kVotes || is_small_against(0.5 * step, came - 0.5 * step);
+  });
+}
+
 void ImuClock::follow(TimeNs driver_ns) {
   if (last_ns_) {
     const double step = seconds_between(*last_ns_, driver_ns);
@@ -35,7 +45,10 @@ void ImuClock::follow(TimeNs driver_ns) {
     if (std::abs(step - interval_) <= kClockJump) interval_ += interval_ / kClockMemory * (step - interval_);
   }
   last_ns_ = driver_ns;
-  for (Other& other : others_) other.before_ns = other.newest_ns;
+  for (Other& other : others_) {
+    other.before_ns = other.newest_ns;
+    other.readings = 0;
+  }
   if (uncertain_ && seconds_between(uncertain_->t_ns, driver_ns) > kLostAfter) uncertain_.reset();
 }
 
@@ -53,6 +66,7 @@ void ImuClock::add(const ImuSample& sample) {
     if (!follows || long_enough) settle(false);
   } else if (last_ns_) {
     const double step = seconds_between(*last_ns_, sample.t_ns);
+    if (others_went_on(step)) went_on_ns_ = sample.t_ns;
     if (jumps(step) && others_show(step)) {
       waiting_ = true;
       jump_ = step - interval_;
@@ -75,6 +89,7 @@ void ImuClock::observe(Stream stream, TimeNs stamp_ns) {
   }
   if (!waiting_ && last_ns_) review(other, stamp_ns);
   other.newest_ns = stamp_ns;
+  ++other.readings;
 }
 
 /// While samples wait, the first of them has a stamp that is a time; later ones may have none.

@@ -29,6 +29,8 @@ class ImuClock {
   /// observe().
   [[nodiscard]] std::optional<ImuSample> next();
 
+  /// Did another sensor go on before this sample, which came late? Then time passed, and others were lost.
+  [[nodiscard]] bool went_on_before(const ImuSample& sample) const { return went_on_ns_ == sample.t_ns + shift_ns_; }
   [[nodiscard]] bool waiting() const { return waiting_; }
   /// Was a jump taken out since the last call?
   [[nodiscard]] bool take_correction() { return std::exchange(new_correction_, false); }
@@ -40,6 +42,7 @@ class ImuClock {
   struct Other {
     std::optional<TimeNs> newest_ns;
     std::optional<TimeNs> before_ns;  ///< the newest when the last inertial sample came that followed the one before
+    int readings = 0;                 ///< since then
     double ahead = 0.0;               ///< [s] of the inertial samples, usually
   };
   /// A jump that was taken out.
@@ -51,6 +54,7 @@ class ImuClock {
 
   [[nodiscard]] bool jumps(double step) const;
   [[nodiscard]] bool others_show(double step) const;
+  [[nodiscard]] bool others_went_on(double step) const;
   void follow(TimeNs driver_ns);
   [[nodiscard]] TimeNs newest_waiting() const;
   void settle(bool own_clock);
@@ -64,6 +68,7 @@ class ImuClock {
   TimeNs shift_ns_ = 0;                  ///< driver's clock less the common one
   std::optional<TimeNs> last_ns_;        ///< the newest sample that followed the one before, by the driver's clock
   double interval_ = 0.0;                ///< [s] usual
+  std::optional<TimeNs> went_on_ns_;     ///< the last sample before which others went on, by the driver's clock
   std::optional<Correction> uncertain_;  ///< the last one, until it is certain
   int corrected_ = 0;
   bool new_correction_ = false;  ///< since take_correction()

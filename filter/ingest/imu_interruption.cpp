@@ -13,11 +13,12 @@ constexpr double kSettles = 0.07;  // [s] chosen: two frames at 30 Hz after a br
 }  // namespace
 
 /// A gap that the state has not passed yet grows by the next one.
-void ImuInterruption::add_gap(TimeNs from_ns, TimeNs to_ns, double unseen) {
-  if (!gap_) gap_ = Gap{from_ns};
+void ImuInterruption::add_gap(TimeNs from_ns, TimeNs to_ns, const Unseen& unseen) {
+  if (!gap_) gap_ = Gap{from_ns, to_ns, {}, 0.0};
   gap_->to_ns = to_ns;
-  gap_->counted *= gap_->unseen / (gap_->unseen + unseen);
-  gap_->unseen += unseen;
+  if (unseen.time > 0.0) gap_->counted *= gap_->unseen.time / (gap_->unseen.time + unseen.time);
+  gap_->unseen.time += unseen.time;
+  gap_->unseen.unmeasured += unseen.unmeasured;
 }
 
 void ImuInterruption::add_uncertain(TimeNs t_ns) {
@@ -25,12 +26,13 @@ void ImuInterruption::add_uncertain(TimeNs t_ns) {
 }
 
 /// What the vehicle did in the gap, it did all the time: standard deviations grow with the time.
-double ImuInterruption::take_unseen(TimeNs t_ns) {
-  if (!gap_ || t_ns <= gap_->from_ns) return 0.0;
+ImuInterruption::Unseen ImuInterruption::take_unseen(TimeNs t_ns) {
+  if (!gap_ || t_ns <= gap_->from_ns) return {};
   const bool over = t_ns >= gap_->to_ns;
   const double passed = seconds_between(gap_->from_ns, t_ns) / seconds_between(gap_->from_ns, gap_->to_ns);
   const double share = over ? 1.0 : std::max(passed, gap_->counted);  // counted before the gap grew longer
-  const double unseen = gap_->unseen * std::sqrt(share * share - gap_->counted * gap_->counted);
+  const double part = std::sqrt(share * share - gap_->counted * gap_->counted);
+  const Unseen unseen = {gap_->unseen.time * part, gap_->unseen.unmeasured * part};
   gap_->counted = share;
   if (over) gap_.reset();
   add_uncertain(t_ns);

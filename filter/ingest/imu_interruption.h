@@ -10,15 +10,21 @@ namespace ear {
 
 class ImuInterruption {
  public:
-  /// No samples between these stamps; `unseen` [s]: the time that passed meanwhile, if the clock jumped as well.
-  void add_gap(TimeNs from_ns, TimeNs to_ns, double unseen);
+  /// What is not known of a gap, standard deviations [s].
+  struct Unseen {
+    double time = 0.0;        ///< how long it took: samples may be lost, or the clock jumped
+    double unmeasured = 0.0;  ///< how long nothing was measured that could be used
+  };
+
+  /// No samples between these stamps.
+  void add_gap(TimeNs from_ns, TimeNs to_ns, const Unseen& unseen);
   /// A sample at that time may be off by more than noise.
   void add_uncertain(TimeNs t_ns);
   /// Two images have shown the motion, up to that time.
   void set_bridged(TimeNs t_ns) { bridged_ns_ = t_ns; }
 
-  /// The vehicle moved unseen for so long [s], as far as the state, which has come to `t_ns`, does not know of it yet.
-  [[nodiscard]] double take_unseen(TimeNs t_ns);
+  /// As far as the state, which has come to `t_ns`, does not know of it yet.
+  [[nodiscard]] Unseen take_unseen(TimeNs t_ns);
   /// Is there anything to bridge? Asked once a frame, which then is past.
   [[nodiscard]] bool take_uncertain();
   /// With an attitude that may be some degrees off, wheels and lasers would be linearised in the wrong place: the next
@@ -28,8 +34,8 @@ class ImuInterruption {
  private:
   struct Gap {
     TimeNs from_ns = 0;
-    TimeNs to_ns = 0;      ///< at once, if the clock jumped back
-    double unseen = 0.0;   ///< [s] that passed
+    TimeNs to_ns = 0;  ///< at once, if the clock jumped back
+    Unseen unseen;
     double counted = 0.0;  ///< share of it that the covariance knows of
   };
 

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "filter/ingest/impact_guard.h"
 #include "filter/ingest/limits.h"
 
 namespace ear {
@@ -15,29 +14,28 @@ constexpr double kAlike = 0.25;
 
 }  // namespace
 
-bool SpikeWatch::add(ImuBuffer& samples, double dt, bool no_strike, bool clips) {
+bool SpikeWatch::add(ImuBuffer& samples, double dt, bool clips) {
   const Eigen::Vector3d value = samples.entry(0).sample.*value_;
   const Eigen::Vector3d before = samples.entry(length_ + 1).sample.*value_;
   const double step = (value - (length_ > 0 ? measured_[length_ - 1] : before)).norm();
-  const bool may_be_strike = strikes_ && !no_strike;
   const double spread = kClear * std::sqrt(step_variance_);
-  const double limit = std::max(strikes_ && no_strike ? 0.0 : std::max(least_, least_rate_ * dt), spread);
+  const double limit = std::max({least_, least_rate_ * dt, spread});
   const double counted = std::min(step, limit);
   step_variance_ += (1.0 - std::exp(-dt / kStreamGap)) * (counted * counted - step_variance_);
 
   if (length_ > 0) {
     const double off = (measured_[length_ - 1] - before).norm();
     if (step > limit && (value - before).norm() <= kAlike * off) {
-      replace(samples, may_be_strike && length_ == 2);
+      replace(samples, strikes_ && length_ == 2);
       return true;
     }
-    const bool strike = may_be_strike && (clips || (value - measured_[0]).norm() > kAlike * off);
+    const bool strike = strikes_ && (clips || (value - measured_[0]).norm() > kAlike * off);
     if (length_ == kLongest || strike) give_up(samples);
   }
-  const bool begins = step > limit && samples.entry(1).noise.*factor_ == 1.0 && !(may_be_strike && clips);
+  const bool begins = step > limit && samples.entry(1).noise.*factor_ == 1.0 && !(strikes_ && clips);
   if (length_ == 0 && !begins) return false;
   measured_[length_++] = value;
-  for (std::size_t i = may_be_strike && length_ == 1 ? 1 : 0; i < length_; ++i) {
+  for (std::size_t i = strikes_ && length_ == 1 ? 1 : 0; i < length_; ++i) {
     ImuBuffer::Entry& held = samples.entry(length_ - 1 - i);
     const double coherent = std::sqrt(2.0 * static_cast<double>(i) + 1.0);
     held.sample.*value_ = before;
@@ -69,9 +67,29 @@ void SpikeWatch::replace(ImuBuffer& samples, bool in_doubt) {
   length_ = 0;
 }
 
+/// As in a spike: what the line leaves of the integral over n samples lies between two that were measured. The step
+/// across them says as much of the walk as those before.
+void SpikeWatch::cross(ImuBuffer& samples, double dt, int lost) {
+  give_up(samples);
+  const double n = lost;
+  const double step = (samples.entry(0).sample.*value_ - samples.entry(1).sample.*value_).squaredNorm() / (n + 1.0);
+  const double variance = std::max(step_variance_, step) * std::pow(n + 1.0, 3) / (36.0 * (n + 2.0));
+  double& factor = samples.entry(0).noise.*factor_;
+  factor = std::max(factor, std::sqrt(variance) / sigma_);
+  const double counted = std::min(step, kClear * kClear * step_variance_);
+  step_variance_ += (1.0 - std::exp(-dt / kStreamGap)) * (counted - step_variance_);
+}
+
+double SpikeWatch::held() const { return std::sqrt(step_variance_) / (3.0 * sigma_); }
+
 void SpikeWatch::give_up(ImuBuffer& samples) {
   for (std::size_t i = 0; i < length_; ++i) samples.entry(length_ - i).sample.*value_ = measured_[i];
   length_ = 0;
+}
+
+void ImuSpikes::cross(ImuBuffer& samples, double dt, int lost) {
+  gyro_.cross(samples, dt, lost);
+  accel_.cross(samples, dt, lost);
 }
 
 void ImuSpikes::give_up(ImuBuffer& samples) {
@@ -80,16 +98,18 @@ void ImuSpikes::give_up(ImuBuffer& samples) {
 }
 
 ImuSpikes::ImuSpikes(const ImpactConfig& config, const ImuCalibration& imu)
-    : gyro_(&ImuSample::gyro_B, &ImuNoiseFactors::gyro, SampleSigma(imu).gyro, 0.0, kTurnRate, false),
-      accel_(&ImuSample::accel_B, &ImuNoiseFactors::accel, SampleSigma(imu).accel, config.accel_deviation, 0.0, true) {}
+    : gyro_(&ImuSample::gyro_B, &ImuNoiseFactors::gyro, SampleSigma(imu, 1.0 / imu.rate_hz).gyro, 0.0, kTurnRate,
+            false),
+      accel_(&ImuSample::accel_B, &ImuNoiseFactors::accel, SampleSigma(imu, 1.0 / imu.rate_hz).accel,
+             config.accel_deviation, 0.0, true) {}
+
+void ImuSpikes::set_sigma(const SampleSigma& sigma) {
+  gyro_.set_sigma(sigma.gyro);
+  accel_.set_sigma(sigma.accel);
+}
 
 ImuFault ImuSpikes::add(ImuBuffer& samples, double dt, bool accel_clips) {
-  const std::size_t accel_length = accel_.length();
-  const bool together = gyro_.length() == accel_length;  // so far
-  const bool gyro = gyro_.add(samples, dt, false, false);
-  const bool no_strike = together && (gyro || gyro_.length() > accel_length);
-  const bool accel = accel_.add(samples, dt, no_strike, accel_clips);
-  return {gyro, accel};
+  return {gyro_.add(samples, dt, false), accel_.add(samples, dt, accel_clips)};
 }
 
 }  // namespace ear

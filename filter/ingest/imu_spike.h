@@ -10,6 +10,7 @@
 #include "ear/calibration.h"
 #include "ear/filter_config.h"
 #include "ear/types.h"
+#include "filter/ingest/impact_guard.h"
 #include "filter/ingest/imu_buffer.h"
 
 namespace ear {
@@ -27,8 +28,8 @@ class SpikeWatch {
   using Value = Eigen::Vector3d ImuSample::*;
   using Factor = double ImuNoiseFactors::*;
 
-  /// `sigma`: of a sample's white noise. `least`, or `least_rate` [1/s]: of a step between samples, no smaller one is a
-  /// jump. `strikes`: the body may do it as well. All in the sensor's unit.
+  /// `sigma`: of a sample's white noise, at first. `least`, or `least_rate` [1/s]: of a step between samples, no
+  /// smaller one is a jump. `strikes`: the body may do it as well. All in the sensor's unit.
   SpikeWatch(Value value, Factor factor, double sigma, double least, double least_rate, bool strikes)
       : value_(value),
         factor_(factor),
@@ -38,11 +39,15 @@ class SpikeWatch {
         strikes_(strikes),
         step_variance_(6.0 * sigma * sigma) {}
 
-  /// The newest of `samples` came `dt` [s] after the one before. `no_strike`: the other sensor jumped with this one.
-  /// Until its end is seen, a spike is held at the value before it; from then on, a line crosses it. Did one end?
-  bool add(ImuBuffer& samples, double dt, bool no_strike, bool clips);
-  /// Samples in a row, with the newest, that may be a spike.
-  [[nodiscard]] std::size_t length() const { return length_; }
+  void set_sigma(double sigma) { sigma_ = sigma; }
+  /// The newest of `samples` came `dt` [s] after the one before. Until its end is seen, a spike is held at the value
+  /// before it; from then on, a line crosses it. Did one end?
+  bool add(ImuBuffer& samples, double dt, bool clips);
+  /// Before the newest of `samples` so many were lost, in `dt` [s]: a line crosses them.
+  void cross(ImuBuffer& samples, double dt, int lost);
+  /// Factor on the noise for each interval for which a sample's value is held: the variance of the integral of the walk
+  /// over n intervals is q n^3 / 3.
+  [[nodiscard]] double held() const;
   /// The newest sample ends no spike, and those before it were none: a strike, which leaves them as uncertain as a
   /// spike.
   void give_up(ImuBuffer& samples);
@@ -65,9 +70,15 @@ class ImuSpikes {
  public:
   ImuSpikes(const ImpactConfig& config, const ImuCalibration& imu);
 
+  /// Of the white noise of the samples that follow.
+  void set_sigma(const SampleSigma& sigma);
   /// What ended with the newest of `samples`, which came `dt` [s] after the one before. `accel_clips`: it is clipped.
   ImuFault add(ImuBuffer& samples, double dt, bool accel_clips);
-  /// The newest came after a gap.
+  /// The newest came after a gap of `lost` samples, in `dt` [s].
+  void cross(ImuBuffer& samples, double dt, int lost);
+  /// Factors on the noise, per interval for which the values of a sample are held.
+  [[nodiscard]] ImuNoiseFactors held() const { return {gyro_.held(), accel_.held()}; }
+  /// The newest came after a gap in which anything may have happened.
   void give_up(ImuBuffer& samples);
 
  private:

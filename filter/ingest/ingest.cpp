@@ -23,8 +23,8 @@ std::optional<TimeNs> append(Ring<T>& readings, const T& next, TimeNs T::*begin,
 Ingest::Ingest(const FilterConfig& config, const Calibration& calibration)
     : config_(config),
       calibration_(calibration),
-      guard_(calibration, config.max_imu_gap),
-      impact_guard_(config.impact, calibration.imu),
+      guard_(calibration),
+      impact_guard_(config.impact),
       spikes_(config.impact, calibration.imu),
       imu_(kCapacity),
       increments_(kCapacity),
@@ -45,22 +45,29 @@ void Ingest::restart() {
 
 ImuVerdict Ingest::judge(const ImuSample& sample, bool has_state) {
   const ImuVerdict verdict = guard_.judge(sample);
-  if (verdict.accepted && !verdict.begins_anew && !imu_.empty() && verdict.unseen > config_.max_imu_gap) {
+  if (verdict.accepted && !verdict.begins_anew && !imu_.empty() && verdict.unseen + verdict.refused > 0.0) {
     if (!has_state) interruption_ = ImuInterruption{};
-    interruption_.add_gap(imu_.newest().t_ns, sample.t_ns, verdict.unseen);
+    const double time = imu_clock_.went_on_before(sample) ? 0.0 : std::max(verdict.unseen, verdict.refused);
+    interruption_.add_gap(imu_.newest().t_ns, sample.t_ns, {time, verdict.refused});
   }
   return verdict;
 }
 
-ImuFault Ingest::store(const ImuSample& sample) {
+ImuFault Ingest::store(const ImuSample& sample, const ImuVerdict& verdict) {
   const double dt = imu_.empty() ? INFINITY : seconds_between(imu_.newest().t_ns, sample.t_ns);
-  imu_.push(sample, impact_guard_.add(sample));
+  const SampleSigma sigma(calibration_.imu, verdict.interval);
+  imu_.push(sample, impact_guard_.add(sample, sigma));
+  spikes_.set_sigma(sigma);
   ImuFault spike;
-  if (dt <= config_.max_imu_gap) {
-    spike = spikes_.add(imu_, dt, impact_guard_.accel_clips());
-  } else {
+  if (imu_.size() == 1) {
     spikes_.give_up(imu_);
+  } else if (verdict.lost > 0) {
+    spikes_.cross(imu_, dt, verdict.lost);
+  } else {
+    spike = spikes_.add(imu_, dt, impact_guard_.accel_clips());
   }
+  const ImuNoiseFactors held = spikes_.held();
+  imu_.set_walk({held.gyro / verdict.interval, held.accel / verdict.interval});
   if (spike.any()) guard_.count_spike();
   return {spike.gyro || impact_guard_.gyro_clips(), spike.accel || impact_guard_.accel_clips()};
 }

@@ -39,7 +39,7 @@ class Ingest {
   /// `has_state`: one that has to pass the gaps; else the last of them counts alone.
   [[nodiscard]] ImuVerdict judge(const ImuSample& sample, bool has_state);
   /// Into the buffer. What only a fault of a sensor does: a spike (of the samples before), a clipped value.
-  ImuFault store(const ImuSample& sample);
+  ImuFault store(const ImuSample& sample, const ImuVerdict& verdict);
 
   /// What becomes of a reading: the wheels' increment since the one before, by the common clock.
   struct Encoders {

@@ -22,8 +22,8 @@ constexpr Limits kPossible = {};
 
 }  // namespace
 
-InputGuard::InputGuard(const Calibration& calibration, double max_imu_gap)
-    : max_imu_gap_(max_imu_gap),
+InputGuard::InputGuard(const Calibration& calibration)
+    : imu_interval_(1.0 / calibration.imu.rate_hz),
       stereo_(calibration.cameras.size() > 1),
       beam_count_(calibration.lasers ? calibration.lasers->beams.size() : 0) {
   ids_.reserve(kFeatureCapacity);
@@ -50,9 +50,15 @@ ImuVerdict InputGuard::judge(const ImuSample& sample) {
     return verdict;
   }
   ++counts.accepted;
-  if (step > max_imu_gap_) ++counts.gaps;
+  if (step > kMissed * imu_interval_) ++counts.gaps;
   verdict.accepted = true;
-  verdict.unseen = std::max(step > max_imu_gap_ ? step : 0.0, refused);
+  verdict.interval = imu_interval_;
+  verdict.unseen = is_clock_jump(step - imu_interval_) ? step : 0.0;
+  verdict.refused = refused;
+  verdict.gap = step > longest_silence(imu_interval_);
+  verdict.lost = std::max(0, static_cast<int>(std::lround(std::min(step, kLostAfter) / imu_interval_)) - 1);
+  const double change = 1.0 + 1.0 / std::min(static_cast<double>(counts.accepted), 1.0 * kToKnow);
+  if (step > 0.0) imu_interval_ *= step > imu_interval_ ? change : 1.0 / change;
   verdict.begins_anew = stamp == Stamp::set_back || step > kLostAfter;
   if (stamp == Stamp::set_back) verdict.clock_shift = imu_stamps_.clock_shift();
   return verdict;
@@ -91,8 +97,7 @@ Verdict InputGuard::judge(const EncoderSample& sample, std::optional<TimeNs> sta
   if (!takes_stamp(sample.t_ns, state_ns, last_encoder_ns_, counts)) return Verdict::mistimed;
   if (reader.last()) {
     const double dt = seconds_between(reader.last()->t_ns, sample.t_ns);
-    const bool gap = dt <= 0.0 || dt > kStreamGap;  // not later than a reading whose stamp was false
-    if (gap) {
+    if (dt <= 0.0 || dt > reader.longest_interval()) {  // not later than a reading whose stamp was false, or a gap
       reader.clear();
     } else if (reader.largest_angle(sample) > kPossible.turn * (dt + kClockJump)) {  // or the counter was set anew
       reader.clear();

@@ -16,7 +16,11 @@ namespace ear {
 struct ImuVerdict {
   bool accepted = false;
   bool begins_anew = false;  ///< after a gap of 2 s, or with another clock: where the vehicle is now nobody knows
-  double unseen = 0.0;       ///< [s] since the sample before, if some are missing between: lost, or refused
+  double interval = 0.0;     ///< [s] the usual one
+  int lost = 0;              ///< samples between this one and the one before, by their usual interval
+  bool gap = false;          ///< too long since the one before
+  double unseen = 0.0;       ///< [s] since the sample before, if the clock may have jumped instead
+  double refused = 0.0;      ///< [s] that passed while samples were refused
   TimeNs clock_shift = 0;    ///< what the stamps before are to be moved by, if the clock was set back [ns]
 };
 
@@ -28,8 +32,7 @@ enum class Verdict : std::uint8_t {
 
 class InputGuard {
  public:
-  /// `max_imu_gap`: longer gaps are counted [s].
-  InputGuard(const Calibration& calibration, double max_imu_gap);
+  explicit InputGuard(const Calibration& calibration);
 
   [[nodiscard]] ImuVerdict judge(const ImuSample& sample);
 
@@ -57,7 +60,7 @@ class InputGuard {
   [[nodiscard]] bool takes_stamp(TimeNs t_ns, std::optional<TimeNs> state_ns, std::optional<TimeNs>& last_ns,
                                  StreamCounts& counts) const;
 
-  double max_imu_gap_;
+  double imu_interval_;  ///< the usual one: the median [s]
   bool stereo_;
   std::size_t beam_count_;
   InputCounts counts_;

@@ -10,8 +10,9 @@ namespace ear {
 double StreamClock::jump_at(TimeNs t_ns, TimeNs now_ns, double tick) const {
   const double passed = seconds_between(*last_now_ns_, now_ns);
   if (passed > longest_silence(interval_)) return 0.0;
-  const double intervals = std::max(1.0, std::round(passed / interval_));
-  const double jump = seconds_between(*last_ns_, t_ns) - intervals * interval_;
+  const auto intervals = [this](double duration) { return std::max(1.0, std::round(duration / interval_)); };
+  const double step = seconds_between(*last_ns_, t_ns);
+  const double jump = step - interval_ * std::clamp(intervals(step), intervals(passed - tick), intervals(passed));
   const double ahead = seconds_between(now_ns, t_ns) - ahead_;
   return is_clock_jump(jump) && std::abs(jump) > tick && is_small_against(jump, ahead - jump) ? jump : 0.0;
 }

@@ -78,6 +78,9 @@ class EncoderReader {
   /// How far the faster wheel turned since the reading before, which must be there [rad].
   [[nodiscard]] double largest_angle(const EncoderSample& sample) const;
 
+  /// Readings farther apart [s] show nothing: of counts that wrap, not even how far the wheels turned.
+  [[nodiscard]] double longest_interval() const { return calibration_.wraps ? kStreamGap : kStale; }
+
   /// The newest reading.
   [[nodiscard]] const std::optional<EncoderSample>& last() const { return last_; }
   void clear() { last_.reset(); }

@@ -99,10 +99,10 @@ void Sources::propagate(TimeNs t_ns, const Advice& advice, Ingest& ingest, Ekf& 
   ImuInterruption& interruption = ingest.interruption();
   const std::optional<TimeNs> uncertain_ns = ekf.propagate(ingest.imu(), t_ns, imu_noise(advice), normal_walk_);
   if (uncertain_ns) interruption.add_uncertain(*uncertain_ns);
-  const double unseen = interruption.take_unseen(t_ns);
-  if (unseen > 0.0) {
-    ekf.inflate_motion(unseen * std::hypot(ekf.rate_B().norm(), kGapRate), kGapAccel * unseen,
-                       unseen * ekf.state().imu.v_W.norm());
+  const ImuInterruption::Unseen unseen = interruption.take_unseen(t_ns);
+  if (unseen.time > 0.0) {
+    ekf.inflate_time(unseen.time);
+    ekf.inflate_motion(unseen.unmeasured * kGapRate, unseen.unmeasured * kGapAccel, 0.0);
   }
 }
 

@@ -106,7 +106,7 @@ struct StreamCounts {
 /// What was refused or bridged since the start: no sample is dropped without being counted. How far the samples
 /// accepted agree with the state is in Health::sources.
 struct InputCounts {
-  StreamCounts imu;               ///< gaps: longer than FilterConfig::max_imu_gap
+  StreamCounts imu;               ///< gaps: longer than 2.5 of the usual intervals
   StreamCounts encoder;           ///< gaps: longer than 0.25 s
   StreamCounts laser;             ///< gaps: longer than 0.25 s
   StreamCounts camera;            ///< frames; far_ahead: no inertial samples reach their time; gaps: longer than 0.25 s

@@ -9,16 +9,15 @@ namespace ear {
 
 /// How the filter recognises that the vehicle stands, and how firmly it then holds the pose.
 struct StandstillConfig {
-  double duration = 0.5;           ///< [s] stillness before the vehicle counts as standing
-  double max_gyro = 0.02;          ///< [rad/s] mean rate less the bias
-  double max_gyro_at_start = 0.2;  ///< [rad/s] the same before the bias is known: the largest bias of any sensor
-  double max_gyro_spread = 0.15;   ///< [rad/s] standard deviation of the samples over `duration`, vibration included
-  double max_accel_spread = 3.0;   ///< [m/s^2] the same for the specific force
-  double max_flow_px = 0.5;        ///< [px] common motion of the features until the vehicle counts as standing
-  double leave_flow_px = 1.0;      ///< [px] common motion since it stopped that ends it: legs give under rotors
-  double position_sigma = 1e-3;    ///< [m] how far a standing vehicle may shift
-  double rotation_sigma = 5e-4;    ///< [rad]
-  double velocity_sigma = 5e-3;    ///< [m/s]
+  double duration = 0.5;          ///< [s] stillness before the vehicle counts as standing
+  double max_gyro = 0.02;         ///< [rad/s] mean rate less the bias, once that is known
+  double max_gyro_spread = 0.15;  ///< [rad/s] standard deviation of the samples over `duration`, vibration included
+  double max_accel_spread = 3.0;  ///< [m/s^2] the same for the specific force
+  double max_flow_px = 0.5;       ///< [px] common motion of the features until the vehicle counts as standing
+  double leave_flow_px = 1.0;     ///< [px] common motion since it stopped that ends it: legs give under rotors
+  double position_sigma = 1e-3;   ///< [m] how far a standing vehicle may shift
+  double rotation_sigma = 5e-4;   ///< [rad]
+  double velocity_sigma = 5e-3;   ///< [m/s]
 };
 
 /// Standard deviations at the start, before anything was measured.
@@ -130,7 +129,6 @@ struct FilterConfig {
   double huber_px = 1.5;               ///< observations further off than this weigh less [px]
   double gate_probability = 0.98;      ///< chi-square gate of every feature; wheels and beams weigh less instead
   double keyframe_parallax_px = 12.0;  ///< a clone with less median parallax to its elder makes room first [px]
-  double max_imu_gap = 0.05;           ///< [s] a longer gap in the IMU data is bridged, counted, and its noise raised
   PriorConfig prior;
   StandstillConfig standstill;
   OnlineCalibrationConfig online_calibration;

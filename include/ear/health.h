@@ -22,12 +22,12 @@ enum class HealthStatus : std::uint8_t {
 enum class Reason : std::uint8_t {
   none,  ///< there is one
   // What a start waits for, the first one or another after `lost`.
-  no_frame,            ///< neither an image came nor a step was asked for, that inertial samples reach
-  few_samples,         ///< inertial samples are missing
-  other_gravity,       ///< it stands, but the mean specific force is not gravity: another unit, or a broken sensor
-  moves_unseen,        ///< it moves, and neither two cameras nor wheels on the ground show how far
-  few_readings,        ///< it rolls: the wheels' readings do not yet span the time that a start takes
-  wheel_gaps,          ///< it rolls: readings of the wheels are missing, or more than 0.25 s apart
+  no_frame,       ///< neither an image came nor a step was asked for, that inertial samples reach
+  few_samples,    ///< inertial samples are missing
+  other_gravity,  ///< it stands, but the mean specific force is not gravity: another unit, or a broken sensor
+  moves_unseen,   ///< it moves, and neither two cameras nor wheels on the ground show how far
+  few_readings,   ///< it rolls: the wheels' readings do not yet span the time that a start takes
+  wheel_gaps,     ///< it rolls: readings of the wheels are missing, or more than 0.5 s apart (0.25 s where counts wrap)
   wheels_contradict,   ///< it rolls: wheels and inertial samples show different motions, as with slip
   few_frames,          ///< it moves: the frames whose features fit each other do not yet span the time for a start
   cameras_contradict,  ///< it moves: cameras and inertial samples show different motions

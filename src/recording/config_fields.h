@@ -84,7 +84,6 @@ template <typename C, typename F>
 EnableFor<C, StandstillConfig> visit(C& c, F&& f) {
   f("duration", c.duration);
   f("max_gyro", c.max_gyro);
-  f("max_gyro_at_start", c.max_gyro_at_start);
   f("max_gyro_spread", c.max_gyro_spread);
   f("max_accel_spread", c.max_accel_spread);
   f("max_flow_px", c.max_flow_px);
@@ -160,7 +159,6 @@ EnableFor<C, FilterConfig> visit(C& c, F&& f) {
   f("huber_px", c.huber_px);
   f("gate_probability", c.gate_probability);
   f("keyframe_parallax_px", c.keyframe_parallax_px);
-  f("max_imu_gap", c.max_imu_gap);
   f("prior", c.prior);
   f("standstill", c.standstill);
   f("online_calibration", c.online_calibration);

@@ -32,13 +32,17 @@ struct Out {
 };
 
 /// Inertial samples each 5 ms, wheels each 10 ms a moment later, frames each 33 ms which come 12 ms later.
-std::vector<Out> run(const Driver& imu, const Driver& wheels, const Driver& camera, bool with_wheels = true) {
+std::vector<Out> run(const Driver& imu, const Driver& wheels, const Driver& camera, bool with_wheels = true,
+                     const std::function<void(const ImuClock&, const ImuSample&)>& look = {}) {
   ImuClock clock;
   std::vector<Out> out;
   std::vector<TimeNs> in;  // true times of samples handed in, which come out in this order
   std::size_t fetched = 0;
   const auto fetch = [&] {
-    while (const auto sample = clock.next()) out.push_back({in[fetched++], sample->t_ns});
+    while (const auto sample = clock.next()) {
+      if (look) look(clock, *sample);
+      out.push_back({in[fetched++], sample->t_ns});
+    }
   };
   for (TimeNs t = 0; t < kEnd; t += kMs) {
     if (t % (5 * kMs) == 0 && imu(t) >= 0) {
@@ -97,6 +101,35 @@ TEST_CASE("imu clock: samples that are missing, and clocks that jump together, a
     const Driver jumping = [jump](TimeNs t) { return amiss(t) ? t + jump : t; };
     const std::vector<Out> out = run(jumping, jumping, jumping);
     for (const Out& o : out) CHECK(o.stamp == jumping(o.t));
+  }
+}
+
+TEST_CASE("imu clock: readings that come meanwhile show that samples were lost, unless all clocks jumped") {
+  struct Lost {
+    TimeNs lasts = 0;
+    bool jumps = false, wheels = true, found = false;
+  };
+  std::vector<Lost> cases;
+  for (const TimeNs lasts : {50 * kMs, 100 * kMs, 300 * kMs}) {
+    for (const bool wheels : {true, false}) {
+      cases.push_back({lasts, true, wheels, false});
+      const bool frames_show = lasts >= 100 * kMs;  // one comes each 33 ms
+      if (wheels || frames_show) cases.push_back({lasts, false, wheels, true});
+    }
+  }
+  for (const Lost& c : cases) {
+    CAPTURE(c.lasts);
+    CAPTURE(c.jumps);
+    CAPTURE(c.wheels);
+    const Driver jumping = [&c](TimeNs t) { return t < kJumpAt ? t : t + c.lasts; };
+    const Driver lost = [&c](TimeNs t) { return t >= kJumpAt && t < kJumpAt + c.lasts ? TimeNs{-1} : t; };
+    const Driver others = c.jumps ? jumping : Driver(sound);
+    std::optional<bool> found;
+    run(c.jumps ? jumping : lost, others, others, c.wheels, [&](const ImuClock& clock, const ImuSample& sample) {
+      if (sample.t_ns >= kJumpAt + c.lasts && !found) found = clock.went_on_before(sample);
+    });
+    REQUIRE(found);
+    CHECK(*found == c.found);
   }
 }
 
@@ -327,5 +360,21 @@ TEST_CASE("stream clock: while nobody knows the time it changes nothing") {
   const auto unknown = [](TimeNs t) { return t < kJumpAt - 100 * kMs || t > kJumpAt + 100 * kMs; };
   for (const Out& o : run_stream(jumping, {}, unknown)) {
     if (o.t < kBackAt) CHECK(o.stamp == jumping(o.t));
+  }
+}
+
+TEST_CASE("stream clock: where the inertial samples stood still, the readings did not jump") {
+  for (const TimeNs gap : {50 * kMs, 100 * kMs}) {
+    StreamClock clock;
+    for (int i = 0; i < 200; ++i) {
+      const TimeNs t = i * 33 * kMs;
+      // The last sample is from before the gap: time seems to go on in steps of its length.
+      const bool gappy = i > 50;
+      const TimeNs tick = gappy ? gap : 5 * kMs;
+      const TimeNs now = (t + 12 * kMs) / tick * tick;
+      CAPTURE(i);
+      CHECK(clock.correct(t, now, 1e-9 * static_cast<double>(tick)).has_value());
+    }
+    CHECK(clock.jumps() == 0);
   }
 }

@@ -7,6 +7,7 @@
 
 #include "filter/ekf/propagation.h"
 #include "tests/support/about.h"
+#include "tests/support/state_error.h"
 
 using namespace ear;
 using ear::test::about;
@@ -209,6 +210,37 @@ TEST_CASE("ekf: inflated motion is about the body, inflated biases are each sens
   const Eigen::MatrixXd after = ekf.covariance().matrix();
   CHECK(after(err::b_g, err::b_g) == before(err::b_g, err::b_g));
   CHECK(after(err::b_a, err::b_a) == doctest::Approx(before(err::b_a, err::b_a) + 0.25));
+}
+
+TEST_CASE("ekf: an unknown time is one error, along what the state does") {
+  Ekf ekf = started();
+  const ImuBuffer imu = samples();
+  ekf.propagate(imu, kStart + 500'000'000, {}, 0.0);
+  const auto motion = [&ekf] { return ekf.covariance().matrix().block<9, 9>(err::theta, err::theta).eval(); };
+  const State before = ekf.state();
+  const Eigen::MatrixXd P = motion();
+  ekf.inflate_time(0.2);
+  const Eigen::MatrixXd grown = (motion() - P) / 0.04;
+  constexpr double kStep = 1e-4;  // [s]
+  ekf.propagate(imu, before.imu.t_ns + 100'000, {}, 0.0);
+  const Eigen::VectorXd J = ear::test::boxminus(ekf.state(), before).segment<9>(err::theta) / kStep;
+  REQUIRE(J.norm() > 1.0);
+  CHECK((grown - J * J.transpose()).norm() < 1e-3 * J.squaredNorm());
+}
+
+TEST_CASE("ekf: what a sample has beyond the stated noise comes to the usual noise, which may be more") {
+  const auto turned = [](double of_sample, double usual) {
+    Ekf ekf = started();
+    ImuBuffer imu(512);
+    for (TimeNs t_ns = kStart; t_ns <= kStart + 100'000'000; t_ns += kPeriod) {
+      imu.push({t_ns, Eigen::Vector3d::Zero(), {0.0, 0.0, 9.81}}, {of_sample, 1.0});
+    }
+    const double before = ekf.covariance().matrix()(err::theta, err::theta);
+    ekf.propagate(imu, kStart + 100'000'000, {usual, 1.0}, 0.0);
+    return ekf.covariance().matrix()(err::theta, err::theta) - before;
+  };
+  const double stated = turned(1.0, 1.0), usual = turned(1.0, 30.0), sample = turned(40.0, 1.0);
+  CHECK(turned(40.0, 30.0) - stated == about(usual - stated + sample - stated, 1e-3));
 }
 
 TEST_CASE("ekf: a scale that nothing measures counts from where the state started") {

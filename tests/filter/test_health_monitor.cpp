@@ -29,6 +29,7 @@ struct Drive {
   Records records{};
   double t = 0.0;
   double imu_t = 0.0;
+  double last_imu_t = 0.0;
 
   Drive() {
     frame.running = true;
@@ -40,8 +41,16 @@ struct Drive {
     for (std::size_t i = 0; i < index_of(Source::gyroscope); ++i) records[i].used = 3;
   }
 
+  void hear_imu(double stamp) {
+    ImuVerdict verdict;
+    verdict.accepted = true;
+    verdict.lost = static_cast<int>(std::lround(100.0 * (stamp - last_imu_t))) - 1;
+    verdict.gap = stamp - last_imu_t > 0.12;
+    monitor.add_imu(at(stamp), verdict);
+    last_imu_t = stamp;
+  }
   void imu_until(double end) {
-    for (; imu_t <= end; imu_t += 0.01) monitor.add_imu(at(imu_t), 0.05);
+    for (; imu_t <= end; imu_t += 0.01) hear_imu(imu_t);
   }
   void go_on(double duration) {
     for (const double end = t + duration; t < end; t += 0.05) {
@@ -223,6 +232,44 @@ TEST_CASE("health: images that cannot be true are not to be used") {
     drive.stamp_error = 0;
     drive.go_on(0.05);
     CHECK(drive.usable);
+  }
+}
+
+TEST_CASE("health: an image far ahead of the inertial samples is at fault if these go on, not if some were lost") {
+  Drive drive;
+  drive.go_on(2.0);
+  const auto camera_faulty = [&] { return drive.health().faulty[index_of(Source::camera_left)]; };
+  const auto imu_faulty = [&] { return drive.health().faulty[index_of(Source::gyroscope)]; };
+  SUBCASE("lost, the image used") {
+    for (int i = 0; i < 20; ++i) {
+      drive.t += 0.02;
+      drive.go_on(0.05);  // without samples since the last image
+      drive.imu_t += 0.05;
+      drive.go_on(0.2);
+    }
+    CHECK_FALSE(camera_faulty());
+    CHECK_FALSE(imu_faulty());
+  }
+  SUBCASE("lost, the image refused") {
+    for (int i = 0; i < 20; ++i) {
+      drive.monitor.add_refused_frame(at(drive.last_imu_t));
+      drive.imu_t += 0.06;
+      drive.t += 0.06;
+      drive.go_on(0.2);
+    }
+    CHECK_FALSE(camera_faulty());
+    CHECK_FALSE(imu_faulty());
+  }
+  SUBCASE("ahead") {
+    drive.monitor.add_refused_frame(at(drive.last_imu_t));
+    drive.go_on(0.05);
+    CHECK(camera_faulty());
+    CHECK_FALSE(imu_faulty());
+  }
+  SUBCASE("no sample comes any more") {
+    drive.monitor.add_refused_frame(at(drive.last_imu_t));
+    drive.monitor.add_refused_frame(at(drive.last_imu_t));
+    CHECK(imu_faulty());
   }
 }
 
@@ -415,7 +462,7 @@ TEST_CASE("health: wheels that are slower than the frames carry the estimate unt
   frame.statistics.on_ground = true;
   Records records{};
   const auto step = [&](double t, bool reading) {
-    monitor.add_imu(at(t), 0.05);
+    monitor.add_imu(at(t), {});
     if (reading) monitor.add_encoder(Verdict::accepted, at(t));
     frame.t_ns = at(t);
     frame.statistics.wheel_rows_used = reading ? 5 : 0;
@@ -444,7 +491,7 @@ TEST_CASE("health: a sensor that never spoke is silent, whatever the stamps") {
     frame.running = true;
     frame.statistics.on_ground = true;
     for (double t = start; t < start + 1.0; t += 0.05) {
-      monitor.add_imu(at(t), 0.05);
+      monitor.add_imu(at(t), {});
       frame.t_ns = at(t);
       monitor.add_frame(frame, Records{});
     }

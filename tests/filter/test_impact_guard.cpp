@@ -25,14 +25,14 @@ const double kAccelSigma = make_imu().accel_noise * std::sqrt(kRate);  // of a s
 /// A hovering body's IMU, to which something is added.
 class Stream {
  public:
-  explicit Stream(const ImpactConfig& config = {}) : guard_(config, make_imu()) {}
+  explicit Stream(const ImpactConfig& config = {}) : guard_(config) {}
 
   ImuSample sample(const Eigen::Vector3d& force_B, double vibration = 0.0) {
     t_ns_ += static_cast<TimeNs>(1e9 / kRate);
     const double spread = std::hypot(kAccelSigma, vibration);
     return {t_ns_, random(0.014), random(spread) + Eigen::Vector3d(0.0, 0.0, kGravity) + force_B};
   }
-  ImuNoiseFactors add(const ImuSample& s) { return guard_.add(s); }
+  ImuNoiseFactors add(const ImuSample& s) { return guard_.add(s, SampleSigma(make_imu(), 1.0 / kRate)); }
   ImuNoiseFactors add(double upwards, double vibration = 0.0) { return add(sample({0.0, 0.0, upwards}, vibration)); }
 
  private:

@@ -24,12 +24,18 @@ Calibration vehicle() {
 
 ImuSample sample(TimeNs t_ns, double rate = 0.0) { return {t_ns, {0.0, 0.0, rate}, {0.0, 0.0, 9.81}}; }
 
+ImuVerdict add(Ingest& ingest, const ImuSample& sample, bool has_state) {
+  const ImuVerdict verdict = ingest.judge(sample, has_state);
+  REQUIRE(verdict.accepted);
+  ingest.store(sample, verdict);
+  return verdict;
+}
+
 /// With inertial samples each 5 ms up to `until_ns`.
 Ingest filled(TimeNs until_ns) {
   Ingest ingest(FilterConfig{}, vehicle());
   for (TimeNs t_ns = 0; t_ns <= until_ns; t_ns += 5 * kMs) {
-    REQUIRE(ingest.judge(sample(t_ns), true).accepted);
-    ingest.store(sample(t_ns));
+    add(ingest, sample(t_ns), true);
   }
   return ingest;
 }
@@ -70,18 +76,18 @@ TEST_CASE("ingest: a reading that is not later than the one before, or far behin
   CHECK(counts.laser.far_ahead == 1);
 }
 
-TEST_CASE("ingest: a gap leaves motion unseen, once, in proportion to how far the state has come") {
+TEST_CASE("ingest: how long a gap took is unseen, once, in proportion to how far the state has come") {
   Ingest ingest = filled(50 * kMs);
   CHECK(ingest.judge(sample(250 * kMs), true).unseen == doctest::Approx(0.2));
   ImuInterruption& gap = ingest.interruption();
-  CHECK(gap.take_unseen(50 * kMs) == 0.0);
+  CHECK(gap.take_unseen(50 * kMs).time == 0.0);
   CHECK_FALSE(gap.waits_for_images(50 * kMs));
-  const double half = gap.take_unseen(150 * kMs);
+  const double half = gap.take_unseen(150 * kMs).time;
   CHECK(half == doctest::Approx(0.1));
   CHECK(gap.waits_for_images(160 * kMs));
-  const double rest = gap.take_unseen(300 * kMs);
+  const double rest = gap.take_unseen(300 * kMs).time;
   CHECK(std::hypot(half, rest) == doctest::Approx(0.2));  // variances add up to those of the whole
-  CHECK(gap.take_unseen(400 * kMs) == 0.0);
+  CHECK(gap.take_unseen(400 * kMs).time == 0.0);
   CHECK(gap.take_uncertain());
   CHECK_FALSE(gap.take_uncertain());
 }
@@ -89,25 +95,81 @@ TEST_CASE("ingest: a gap leaves motion unseen, once, in proportion to how far th
 TEST_CASE("ingest: gaps that the state has not passed yet are all unseen; without a state, the last of them") {
   for (const bool has_state : {true, false}) {
     Ingest ingest = filled(50 * kMs);
-    const auto gap_until = [&](TimeNs t_ns) {
-      REQUIRE(ingest.judge(sample(t_ns), has_state).accepted);
-      ingest.store(sample(t_ns));
-    };
+    const auto gap_until = [&](TimeNs t_ns) { add(ingest, sample(t_ns), has_state); };
     gap_until(250 * kMs);
     gap_until(350 * kMs);
-    CHECK(ingest.interruption().take_unseen(400 * kMs) == doctest::Approx(has_state ? 0.3 : 0.1));
+    CHECK(ingest.interruption().take_unseen(400 * kMs).time == doctest::Approx(has_state ? 0.3 : 0.1));
   }
 
   Ingest ingest = filled(50 * kMs);
-  for (TimeNs t_ns = 250 * kMs; t_ns <= 300 * kMs; t_ns += 10 * kMs) {
-    REQUIRE(ingest.judge(sample(t_ns), true).accepted);
-    ingest.store(sample(t_ns));
-  }
+  for (TimeNs t_ns = 250 * kMs; t_ns <= 300 * kMs; t_ns += 10 * kMs) add(ingest, sample(t_ns), true);
   ImuInterruption& gap = ingest.interruption();
-  const double first = gap.take_unseen(200 * kMs);  // three quarters of it
+  const double first = gap.take_unseen(200 * kMs).time;  // three quarters of it
   REQUIRE(ingest.judge(sample(500 * kMs), true).accepted);
-  CHECK(gap.take_unseen(201 * kMs) == 0.0);  // of both together as much is known already
-  CHECK(std::hypot(first, gap.take_unseen(500 * kMs)) == doctest::Approx(0.4));
+  CHECK(gap.take_unseen(201 * kMs).time == 0.0);  // of both together as much is known already
+  CHECK(std::hypot(first, gap.take_unseen(500 * kMs).time) == doctest::Approx(0.4));
+}
+
+TEST_CASE("ingest: where other sensors went on in a gap, its time is known; the images are asked all the same") {
+  Ingest ingest = filled(50 * kMs);
+  for (const TimeNs t_ns : {10, 20, 30, 40, 50, 60, 70, 80, 90, 100}) {
+    ingest.imu_clock().observe(ImuClock::Stream::encoder, t_ns * kMs);
+    if (t_ns > 50) continue;
+    ingest.imu_clock().add(sample(t_ns * kMs));
+    while (ingest.imu_clock().next()) continue;
+  }
+  ingest.imu_clock().add(sample(105 * kMs));
+  const std::optional<ImuSample> after = ingest.imu_clock().next();
+  REQUIRE(after);
+  CHECK(ingest.judge(*after, true).lost == 10);
+  CHECK(ingest.interruption().take_unseen(105 * kMs).time == 0.0);
+  CHECK(ingest.interruption().take_uncertain());
+}
+
+TEST_CASE("ingest: of samples that are refused, nothing was measured") {
+  Ingest ingest = filled(300 * kMs);
+  for (TimeNs t_ns = 100 * kMs; t_ns <= 300 * kMs; t_ns += 5 * kMs) {  // the clock was set back
+    CHECK_FALSE(ingest.judge(sample(t_ns), true).accepted);
+  }
+  add(ingest, sample(305 * kMs), true);
+  const ImuInterruption::Unseen unseen = ingest.interruption().take_unseen(305 * kMs);
+  CHECK(unseen.time == doctest::Approx(0.2));
+  CHECK(unseen.unmeasured == unseen.time);
+}
+
+TEST_CASE("ingest: samples are lost by what is usual, not by the rate that the calibration states") {
+  for (const TimeNs interval_ns : {5 * kMs, 20 * kMs, 62 * kMs}) {
+    CAPTURE(interval_ns);
+    Ingest ingest(FilterConfig{}, vehicle());  // 200 Hz
+    TimeNs t_ns = 0;
+    for (int i = 0; i < 300; ++i, t_ns += interval_ns) add(ingest, sample(t_ns), true);
+    for (int i = 0; i < 100; ++i, t_ns += interval_ns) {
+      if (i % 4 == 3) t_ns += 2 * interval_ns;  // a third of all samples
+      CHECK(add(ingest, sample(t_ns), true).lost == (i % 4 == 3 ? 2 : 0));
+    }
+    const ImuVerdict late = add(ingest, sample(t_ns + 3 * interval_ns), true);
+    CHECK(late.lost >= 3);
+    CHECK(late.gap == (4 * interval_ns > 120 * kMs));
+  }
+}
+
+TEST_CASE("ingest: readings of wheels up to half a second apart are one increment; of counts that wrap, a quarter") {
+  for (const bool wraps : {false, true}) {
+    CAPTURE(wraps);
+    Calibration calibration = vehicle();
+    calibration.encoder->wraps = wraps;
+    Ingest ingest(FilterConfig{}, calibration);
+    TimeNs t_ns = 0;
+    const auto increment_after = [&](TimeNs interval_ns) {
+      t_ns += interval_ns;
+      return ingest.take({t_ns, 0, 0}, std::nullopt).increment.has_value();
+    };
+    CHECK_FALSE(increment_after(0));
+    CHECK(increment_after(240 * kMs));
+    CHECK(increment_after(400 * kMs) == !wraps);
+    CHECK_FALSE(increment_after(600 * kMs));
+    CHECK(increment_after(10 * kMs));
+  }
 }
 
 TEST_CASE("ingest: a restart forgets samples and readings, not the counts") {

@@ -95,16 +95,6 @@ TEST_CASE("initial state: mean and difference of the wheel radii are as well kno
   }
 }
 
-TEST_CASE("initial state: an IMU that is slow has no gap between its samples") {
-  Calibration calibration = vehicle();
-  for (const double rate_hz : {1000.0, 200.0, 50.0}) {
-    calibration.imu.rate_hz = rate_hz;
-    CHECK(settings_for(FilterConfig{}, calibration).max_imu_gap == FilterConfig{}.max_imu_gap);
-  }
-  calibration.imu.rate_hz = 16.0;
-  CHECK(settings_for(FilterConfig{}, calibration).max_imu_gap == about(0.156, 0.01));
-}
-
 TEST_CASE("initial state: standard deviations, rates and offsets that cannot be are named") {
   using C = Calibration;
   const auto reason = [](const std::function<void(C&)>& spoil) {

@@ -72,6 +72,26 @@ TEST_CASE("standstill: a shaken or turning IMU ends it at once") {
   CHECK_FALSE(stands(standstill, frame_at((i + 20) * kFrame, 0.0), turning));
 }
 
+TEST_CASE("standstill: before the bias is known any steady rate may be bias, if wheels or images rest") {
+  ImuStatistics biased = quiet();
+  biased.gyro_mean = {0.0, 0.55, 0.0};  // a real one
+  const auto still = [&](double shift_px, double wheel_angle, bool shown) {
+    Standstill standstill = watch();
+    for (int i = 1; i < 60; ++i) {
+      const FeatureFrame frame = frame_at(i * kFrame, shown ? shift_px * i : 0.0);
+      standstill.add({(i - 1) * kFrame, i * kFrame, Eigen::Vector2d::Constant(wheel_angle)});
+      FeatureFrame blind;
+      blind.t_ns = frame.t_ns;
+      standstill.update({shown ? frame : blind, frame.t_ns, biased, std::nullopt, true});
+    }
+    return standstill.stands();
+  };
+  CHECK(still(0.0, 0.0, true));
+  CHECK(still(0.0, 0.0, false));  // by the wheels alone
+  CHECK_FALSE(still(1.0, 0.0, true));
+  CHECK_FALSE(still(0.0, 0.1, false));
+}
+
 TEST_CASE("standstill: without features it is not known") {
   Standstill standstill = watch();
   for (int i = 0; i < 60; ++i) {

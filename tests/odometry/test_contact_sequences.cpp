@@ -16,10 +16,11 @@ struct Raised {
 };
 
 Raised run_guard(const simulator::Simulation& simulation) {
-  ImpactGuard guard(ImpactConfig{}, simulation.calibration().imu);
+  ImpactGuard guard(ImpactConfig{});
+  const SampleSigma sigma(simulation.calibration().imu, 1.0 / simulation.calibration().imu.rate_hz);
   Raised raised;
   for (const ImuSample& sample : simulation.imu()) {
-    const ImuNoiseFactors factors = guard.add(sample);
+    const ImuNoiseFactors factors = guard.add(sample, sigma);
     if (factors.accel == 1.0 && factors.gyro == 1.0) continue;
     ++raised.samples;
     const double t = simulator::motion_time(sample.t_ns);

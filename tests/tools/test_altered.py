@@ -71,6 +71,8 @@ class Hop(unittest.TestCase):
         "imu_quarter": 0.03,
         "imu_noise": 0.03,
         "imu_means": 0.02,
+        "imu_bursts": 0.012,  # what moves as before between two samples
+        "wheels_lost": 0.012,
         "camera_third": 0.02,
         "gyro_scale": 0.01,  # 22 mm where the scale is no state
         "wheels_exchanged": 0.02,

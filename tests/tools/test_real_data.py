@@ -256,6 +256,46 @@ class Comma(RealData):
         self.assert_refused("comma2k19", "s", "global_pose/frame_positions: is missing")
 
 
+class Husky(RealData):
+    HEADING = "Sec,NanoSec,0-ref Sec,"
+
+    def setUp(self):
+        super().setUp()
+        self.rows("Encoder_data_parking.csv", "w_left,w_right",
+                  "10,0,0,0,0", "10,100000000,0.1,2,4", "10,200000000,0.2,2,4", "11,900000000,1.9,2,4")
+        self.rows("gx5_1_IMU_data_parking.csv", "a_x,a_y,a_z,w_x,w_y,w_z", "10,50000000,0,1,2,-9.8,0.1,0.2,0.3", "11,0,1,1,2,-9.8,0,0,0")
+        self.rows("Camera_ground_truth_parking.csv", "X,Y,Z,qX,qY,qZ,qW", "10,50000000.5,0,1,2,3,0,0,0.6,0.8")
+
+    def rows(self, name, fields, *lines):
+        self.write("p/" + name, "\n".join([self.HEADING + fields, *lines]) + "\n")
+
+    def test_drive(self):
+        mav0 = self.convert("husky", "p")
+        turn = 262144 / (2.0 * math.pi)  # counts of a radian
+        expected = [["10000000000", "0", "0"], ["10100000000", str(round(0.1 * turn)), str(round(0.2 * turn))],
+                    ["10200000000", str(round(0.3 * turn)), str(round(0.6 * turn))]]
+        self.assertEqual(csv_rows(mav0 / "encoder0/data.csv"), expected)  # up to the gap
+        self.assertEqual(csv_rows(mav0 / "imu0/data.csv"), [["10050000000", "-0.2", "-0.1", "-0.3", "-2", "-1", "9.8"]])
+        truth = [float(x) for x in csv_rows(mav0 / "state_groundtruth_estimate0/data.csv")[0]]
+        for value, expected in zip(truth, [10.05e9, 1.0, -2.0, -3.0, 0.8, 0.0, 0.0, -0.6]):
+            self.assertAlmostEqual(value, expected, places=6)
+
+    def test_bad_input(self):
+        name = "Encoder_data_parking.csv"
+        self.rows(name, "w_left", "10,0,0,0")
+        self.assert_refused("husky", "p", f"{name}:1: fields other than Sec,NanoSec,0-ref Sec,w_left,w_right")
+        self.rows(name, "w_left,w_right", "10,0,0,0")
+        self.assert_refused("husky", "p", f"{name}:2: 4 fields where 5 are expected: the line is torn")
+        self.rows(name, "w_left,w_right", "10,0,0,0,nan")
+        self.assert_refused("husky", "p", f"{name}:2: w_right: 'nan' is no finite number")
+        self.rows(name, "w_left,w_right", "10,5,0,0,0", "10,5,0,0,0")
+        self.assert_refused("husky", "p", f"{name}: row 1: the time is not later than that of the row before")
+        self.rows(name, "w_left,w_right")
+        self.assert_refused("husky", "p", f"{name}: holds no rows")
+        (self.work / "p" / name).unlink()
+        self.assert_refused("husky", "p", f"{name}: is missing")
+
+
 class Ucsd(RealData):
     def setUp(self):
         super().setUp()

@@ -123,6 +123,25 @@ def lost_samples(copy):
     copy.change(["imu0"], lambda rows: [row for row in rows if draws.random() > 0.1])
 
 
+def bursts(rows):
+    """As a recorder that falls behind loses them: `husky` has eight such bursts a second, their lengths as here."""
+    draws, kept, lost_until = random.Random(4), [], 0
+    next_burst = int(rows[0][0])
+    for row in rows:
+        time = int(row[0])
+        while time > next_burst:
+            lost_until = next_burst + round(1e9 * min(0.1, draws.expovariate(1.0 / 0.02)))
+            next_burst = max(lost_until, next_burst + round(1e9 * draws.expovariate(8.0)))
+        if time > lost_until:
+            kept.append(row)
+    return kept
+
+
+def lost_readings(rows):
+    draws = random.Random(5)
+    return [row for row in rows if draws.random() > 0.3]
+
+
 def exchanged(a, b):
     def change(rows):
         for row in rows:
@@ -174,6 +193,7 @@ ALTERATIONS = [
     Alteration("imu_quarter", "every fourth inertial sample", slower_imu(4, every)),
     Alteration("imu_rate", "the same, and sensor.yaml states the rate of all", on(["imu0"], every(4))),
     Alteration("imu_lost", "a tenth of the inertial samples lost, at random", lost_samples),
+    Alteration("imu_bursts", "inertial samples lost eight times a second, for up to 0.1 s", on(["imu0"], bursts)),
     Alteration("imu_late", "stamps of the inertial samples 20 ms late", on(["imu0"], later(0.02))),
     Alteration("imu_very_late", "the same by 100 ms", on(["imu0"], later(0.1))),
     Alteration("imu_noise", "white noise of 0.05 rad/s and 0.5 m/s^2 on each sample", noisy_imu),
@@ -189,6 +209,7 @@ ALTERATIONS = [
     Alteration("wheels_sign", "wheels that count backwards",
                on([WHEELS], lambda rows: [[t, str(-int(left)), str(-int(right))] for t, left, right in rows]), (WHEELS,)),
     Alteration("wheel_ends", "the left wheel's counts stay, in the second half", on([WHEELS], stuck_left_wheel), (WHEELS,)),
+    Alteration("wheels_lost", "three of ten readings of the wheels lost, at random", on([WHEELS], lost_readings), (WHEELS,)),
     Alteration("beams_exchanged", "first and last beam exchanged", on([BEAMS], exchanged(1, 3)), (BEAMS,)),
     Alteration("begins_late", "without the first third: it starts in motion", begin_late),
 ]

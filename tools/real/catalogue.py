@@ -36,6 +36,9 @@ DATA_SETS = [
     DataSet("ucsd", "a course at UCSD: a skid-steered robot indoors, encoders 40 Hz, IMU 100 Hz; no truth but lidar SLAM by students",
             "wheels and IMU; the scans of its lidar are left out", "none stated: local only",
             "https://github.com/shangweihung/Simultaneous-Localization-and-Mapping", "ucsd"),
+    DataSet("husky", "a course at Michigan: a skid-steered Husky on a parking ground, wheel speeds 10 Hz, two IMU 100 Hz, stereo SLAM",
+            "wheels and IMU; of two minutes, before its recorder fell behind", "none stated: local only",
+            "https://github.com/XihangYU630/inekf_wheeled", "husky"),
     DataSet("lawn_wheels", "a mower on grass: wheel speeds in coarse steps, IMU 66.7 Hz, position by radio",
             "here as lawn_wheels; its original layout is not documented", "none stated: local only", "not stated"),
 ]

@@ -45,10 +45,10 @@ ImuStatistics Standstill::recent(const ImuBuffer& imu, TimeNs t_ns) const {
 void Standstill::update(const Evidence& evidence) {
   const FeatureFrame& frame = evidence.frame;
   const ImuStatistics& imu = evidence.recent;
-  const double max_gyro = evidence.b_g ? config_.max_gyro : config_.max_gyro_at_start;
-  const Eigen::Vector3d b_g = evidence.b_g.value_or(Eigen::Vector3d::Zero());
+  // Before the bias is known any rate may be bias: wheels or images have to show the rest.
+  const Eigen::Vector3d b_g = evidence.b_g.value_or(imu.gyro_mean);
   const bool imu_quiet = imu.gyro_spread < config_.max_gyro_spread && imu.accel_spread < config_.max_accel_spread &&
-                         (imu.gyro_mean - b_g).norm() < max_gyro;
+                         (imu.gyro_mean - b_g).norm() < config_.max_gyro;
   const double max_flow_px = stands_ ? config_.leave_flow_px : config_.max_flow_px;
   const std::optional<double> flow_px = common_flow_px(frame);
   const std::optional<double> wheel_rest = evidence.on_ground ? wheel_rest_.duration(evidence.t_ns) : std::nullopt;

@@ -34,7 +34,7 @@ void MountingWatch::restart(TimeNs t_ns, const Eigen::Vector3d& up_B) {
 void MountingWatch::add(const WheelIncrement& increment, const ImuBuffer& imu, const Eigen::Vector3d& b_g,
                         const Eigen::Vector3d& up_B) {
   if (increment.duration() <= 0.0) return;
-  const bool gap = increment.from_ns != end_ns_ || increment.duration() > kStreamGap;
+  const bool gap = increment.from_ns != end_ns_ || increment.duration() > kStale;
   if (gap || windows_ >= kToKnow) restart(increment.from_ns, up_B);
   end_ns_ = increment.to_ns;
   const double dt = increment.duration();
