@@ -47,7 +47,7 @@ class ImuBuffer {
   explicit ImuBuffer(std::size_t capacity) : entries_(capacity) {}
 
   void push(const ImuSample& sample, const ImuNoiseFactors& noise = {});
-  /// What holding the newest sample's values for a second would make of the factors: so much changes meanwhile.
+  /// Factors on the noise per second for which the newest sample's values are held.
   void set_walk(const ImuNoiseFactors& per_second) { walk_ = per_second; }
   /// The sample that so many came after, to correct it: its stamp stays.
   [[nodiscard]] Entry& entry(std::size_t age) { return entries_[size() - 1 - age]; }

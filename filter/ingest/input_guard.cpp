@@ -56,7 +56,8 @@ ImuVerdict InputGuard::judge(const ImuSample& sample) {
   verdict.unseen = is_clock_jump(step - imu_interval_) ? step : 0.0;
   verdict.refused = refused;
   verdict.gap = step > longest_silence(imu_interval_);
-  verdict.lost = std::max(0, static_cast<int>(std::lround(std::min(step, kLostAfter) / imu_interval_)) - 1);
+  const double intervals = std::min(std::max(1.0, step / imu_interval_), static_cast<double>(kCapacity));
+  verdict.lost = static_cast<int>(std::lround(intervals)) - 1;
   const double change = 1.0 + 1.0 / std::min(static_cast<double>(counts.accepted), 1.0 * kToKnow);
   if (step > 0.0) imu_interval_ *= step > imu_interval_ ? change : 1.0 / change;
   verdict.begins_anew = stamp == Stamp::set_back || step > kLostAfter;
