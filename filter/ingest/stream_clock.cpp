@@ -12,7 +12,9 @@ double StreamClock::jump_at(TimeNs t_ns, TimeNs now_ns, double tick) const {
   if (passed > longest_silence(interval_)) return 0.0;
   const auto intervals = [this](double duration) { return std::max(1.0, std::round(duration / interval_)); };
   const double step = seconds_between(*last_ns_, t_ns);
-  const double jump = step - interval_ * std::clamp(intervals(step), intervals(passed - tick), intervals(passed));
+  const double least = step - interval_ * std::clamp(intervals(step), intervals(passed - tick), intervals(passed));
+  if (!is_clock_jump(least)) return 0.0;
+  const double jump = step - interval_ * intervals(passed);
   const double ahead = seconds_between(now_ns, t_ns) - ahead_;
   return is_clock_jump(jump) && std::abs(jump) > tick && is_small_against(jump, ahead - jump) ? jump : 0.0;
 }

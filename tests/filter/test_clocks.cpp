@@ -378,3 +378,21 @@ TEST_CASE("stream clock: where the inertial samples stood still, the readings di
     CHECK(clock.jumps() == 0);
   }
 }
+
+TEST_CASE("stream clock: of a jump there and back nothing is left, whatever the phase of the inertial samples") {
+  for (const TimeNs interval : {9'900'000, 10'000'000, 10'100'000}) {
+    for (const TimeNs phase : {0 * kMs, 1 * kMs, 4 * kMs}) {
+      CAPTURE(interval);
+      CAPTURE(phase);
+      StreamClock clock;
+      double largest = 0.0;
+      for (TimeNs t = 0; t < kEnd; t += interval) {
+        const TimeNs now = (t + phase) / (5 * kMs) * (5 * kMs);
+        const auto stamp = clock.correct(amiss(t) ? t + 100 * kMs : t, now, 0.005);
+        if (stamp) largest = std::max(largest, std::abs(seconds_between(t, *stamp)));
+      }
+      CHECK(largest < 1e-3);
+      CHECK(clock.jumps() == 2);
+    }
+  }
+}
