@@ -54,10 +54,8 @@ ImuPreintegration IntervalMeter::preintegrate(const Situation& now, const ImuBuf
   imu.for_each_piece(
       now.x.imu.t_ns, now.t_ns,
       [&](const Eigen::Vector3d& gyro_B, const Eigen::Vector3d& accel_B, double dt, const ImuNoiseFactors& factors) {
-        ImuCalibration noise = imu_;
-        noise.gyro_noise *= factors.gyro;
-        noise.accel_noise *= factors.accel / now.advice.of(MotionSensor::imu);
-        result.add(gyro_B, accel_B, dt, noise);
+        const double accel = factors.accel / now.advice.of(MotionSensor::imu);
+        result.add(gyro_B, accel_B, dt, with_factors(imu_, {factors.gyro, accel}));
       });
   return result;
 }

@@ -72,10 +72,10 @@ void HealthMonitor::add_refused_imu() {
 }
 
 void HealthMonitor::add_imu(TimeNs t_ns, const ImuVerdict& verdict) {
-  const bool lost = verdict.gap || verdict.refused > 0.0;
-  if (lost && arrivals_.imu_ns) report({Source::gyroscope, Source::accelerometer}, t_ns);
+  const bool refused = verdict.refused > 0.0;
+  if ((verdict.gap || refused) && arrivals_.imu_ns) report({Source::gyroscope, Source::accelerometer}, t_ns);
   arrivals_.imu_ns = t_ns;
-  images_.hear_imu(t_ns, lost || verdict.lost > 0);
+  images_.hear_imu(t_ns, verdict.lost > 0 || refused);
   note_silence(t_ns);
 }
 

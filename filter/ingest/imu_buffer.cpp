@@ -46,7 +46,7 @@ ImuNoiseFactors ImuBuffer::noise_around(std::size_t next, TimeNs to_ns) const {
     const double held = seconds_between(newest().t_ns, to_ns);
     return {std::max(a.gyro, walk_.gyro * held), std::max(a.accel, walk_.accel * held)};
   }
-  const ImuNoiseFactors& b = entries_[std::min(next, size() - 1)].noise;
+  const ImuNoiseFactors& b = entries_[next].noise;
   return {std::max(a.gyro, b.gyro), std::max(a.accel, b.accel)};
 }
 

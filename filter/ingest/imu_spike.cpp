@@ -12,6 +12,12 @@ namespace {
 // three samples differs by 0.4.
 constexpr double kAlike = 0.25;
 
+/// What a line leaves of the integral over so many intervals of a random walk that is known at both ends, `q` being the
+/// variance of a step: the variance of each of the samples that share it.
+double left_by_line(double q, double intervals, double samples) {
+  return q * std::pow(intervals, 3) / (12.0 * samples);
+}
+
 }  // namespace
 
 bool SpikeWatch::add(ImuBuffer& samples, double dt, bool clips) {
@@ -60,7 +66,7 @@ void SpikeWatch::replace(ImuBuffer& samples, bool in_doubt) {
     square += (measured_[i] - crossed).cwiseAbs2() / n;
   }
   const double disagreement = square.sum() - (in_doubt ? 0.0 : mean.squaredNorm());
-  const double variance = (step_variance_ * std::pow(n + 1.0, 3) / (12.0 * n) + disagreement) / 3.0;
+  const double variance = (left_by_line(step_variance_, n + 1.0, n) + disagreement) / 3.0;
   for (std::size_t i = 0; i < length_; ++i) {
     samples.entry(length_ - i).noise.*factor_ = std::max(1.0, std::sqrt(variance) / sigma_);
   }
@@ -73,7 +79,7 @@ void SpikeWatch::cross(ImuBuffer& samples, double dt, int lost) {
   give_up(samples);
   const double n = lost;
   const double step = (samples.entry(0).sample.*value_ - samples.entry(1).sample.*value_).squaredNorm() / (n + 1.0);
-  const double variance = std::max(step_variance_, step) * std::pow(n + 1.0, 3) / (36.0 * (n + 2.0));
+  const double variance = left_by_line(std::max(step_variance_, step), n + 1.0, n + 2.0) / 3.0;
   double& factor = samples.entry(0).noise.*factor_;
   factor = std::max(factor, std::sqrt(variance) / sigma_);
   const double counted = std::min(step, kClear * kClear * step_variance_);

@@ -6,14 +6,13 @@ the phone is a guess, and the noise of the IMU that of phones. The images are a 
 
 import math
 
-from real.layout import (ENCODER_FIELDS, IMU_FIELDS, BadInput, Recording, growing, imu_yaml, matrix, multiply, pose,
-                         pose_yaml, quaternion, rate, read_array, rotate, transpose)
+from real.layout import (ENCODER_FIELDS, FLIP, IMU_FIELDS, BadInput, Recording, encoder_yaml, growing, imu_yaml, matrix,
+                         multiply, pose, quaternion, rate, read_array, rotate, transpose, trapezoids)
 
 RADIUS = 0.34  # [m] nominal
 TRACK = 1.57  # [m] of a RAV4
 COUNTS = 262144
 AXLE = [-1.6, 0.0, -1.3]  # [m] from the windscreen, by eye
-FLIP = [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]]  # [forward, right, down] to [forward, left, up]
 
 
 def read_times(path):
@@ -38,13 +37,9 @@ def read_imu(log):
 def read_encoder(log):
     """Counts of the rear wheels: trapezoids of their speeds."""
     times, speeds = read_log(log / "CAN/wheel_speed", 4)
-    per_metre, rolled, rows = COUNTS / (2.0 * math.pi * RADIUS), [0.0, 0.0], []
-    for i, time in enumerate(times):
-        if i > 0:
-            half = 0.5e-9 * (time - times[i - 1])
-            rolled = [r + half * (a + b) for r, a, b in zip(rolled, speeds[i - 1][2:], speeds[i][2:])]
-        rows.append((time, [str(round(r * per_metre)) for r in rolled]))
-    return rows
+    per_metre = COUNTS / (2.0 * math.pi * RADIUS)
+    rolled = trapezoids([(time, wheels[2:]) for time, wheels in zip(times, speeds)])
+    return [(time, [str(round(r * per_metre)) for r in metres]) for time, metres in rolled]
 
 
 def east_north_up(p):
@@ -78,9 +73,8 @@ def convert(folder, out):
         recording.write("imu0", IMU_FIELDS, imu, imu_yaml("phone on the windscreen, turned to forward, left, up",
                                                           rate([t for t, _ in imu]), (5e-4, 2e-5), (1e-2, 5e-4)))
         recording.write("encoder0", ENCODER_FIELDS, encoder,
-                        "sensor_type: wheel_encoder\ncomment: integrated from the speeds of the rear wheels\n" +
-                        pose_yaml(pose([[1.0, 0, 0], [0, 1.0, 0], [0, 0, 1.0]], AXLE)) +
-                        f"rate_hz: {rate([t for t, _ in encoder]):.0f}\nresolution: {COUNTS}\nwraps: false\n"
-                        f"wheel_radius: [{RADIUS}, {RADIUS}]\nwheel_separation: {TRACK}\nnoise_counts: 200.0\n")
+                        encoder_yaml("integrated from the speeds of the rear wheels",
+                                     pose([[1.0, 0, 0], [0, 1.0, 0], [0, 0, 1.0]], AXLE), rate([t for t, _ in encoder]),
+                                     COUNTS, RADIUS, TRACK, 200.0))
         recording.write_truth(truth)
     return ["where the rear axle is, the wheels' radius and the noise are guesses: see the sensor.yaml files"]

@@ -6,24 +6,21 @@ that of the maker's controller. The truth is stereo SLAM; its axes [forward, rig
 recorder fell behind, speeds are missing for seconds: the recording ends at the first such gap. Of the other IMU (gx5_0) the
 gyroscope has a bias of 0.55 rad/s."""
 
-import csv
-import io
 import math
 
-from real.layout import (ENCODER_FIELDS, IDENTITY, IMU_FIELDS, BadInput, Recording, growing, imu_yaml, matrix, multiply,
-                         number, pose_yaml, quaternion, rate, read_lines, rotate, stamp, transpose)
+from real.layout import (ENCODER_FIELDS, FLIP, IDENTITY, IMU_FIELDS, BadInput, Recording, encoder_yaml, growing, imu_yaml,
+                         matrix, multiply, number, quaternion, rate, read_lines, rotate, stamp, transpose, trapezoids)
 
 RADIUS = 0.1651  # [m] of the maker
 TRACK = 1.0703  # [m] effective: 0.5708 by ruler, times 1.875 of the maker's controller
 COUNTS = 262144
 LONGEST_GAP = 1_000_000_000  # [ns] between two readings of the speeds
 TURN = [[0.0, -1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, -1.0]]  # [right, back, down] to [forward, left, up]
-FLIP = [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]]  # [forward, right, down] to the same
 
 
 def read_rows(path, fields):
     """Rows (time [ns], values) of a csv with a heading, whose first columns are seconds and nanoseconds."""
-    lines = list(csv.reader(io.StringIO("\n".join(read_lines(path)))))
+    lines = [text.split(",") for text in read_lines(path)]
     expected = ["Sec", "NanoSec", "0-ref Sec", *fields]
     if not lines or [field.lstrip("\ufeff") for field in lines[0]] != expected:
         raise BadInput(f"{path}:1: fields other than {','.join(expected)}")
@@ -40,21 +37,14 @@ def read_rows(path, fields):
     return rows
 
 
-def counts(speeds):
-    """Trapezoids of the speeds [rad/s], until a gap."""
-    rolled, rows = [0.0, 0.0], []
-    for i, (time, rates) in enumerate(speeds):
-        if i > 0:
-            before, last = speeds[i - 1]
-            if time - before > LONGEST_GAP:
-                break
-            rolled = [r + 0.5e-9 * (time - before) * (a + b) for r, a, b in zip(rolled, last, rates)]
-        rows.append((time, [str(round(r * COUNTS / (2.0 * math.pi))) for r in rolled]))
-    return rows
+def until_gap(rows):
+    gaps = (i for i in range(1, len(rows)) if rows[i][0] - rows[i - 1][0] > LONGEST_GAP)
+    return rows[: next(gaps, len(rows))]
 
 
 def convert(folder, out):
-    encoder = counts(read_rows(folder / "Encoder_data_parking.csv", ["w_left", "w_right"]))
+    speeds = until_gap(read_rows(folder / "Encoder_data_parking.csv", ["w_left", "w_right"]))
+    encoder = [(t, [str(round(r * COUNTS / (2.0 * math.pi))) for r in turned]) for t, turned in trapezoids(speeds)]
     end = encoder[-1][0]
     imu = [(t, [*rotate(TURN, row[3:]), *rotate(TURN, row[:3])])
            for t, row in read_rows(folder / "gx5_1_IMU_data_parking.csv", ["a_x", "a_y", "a_z", "w_x", "w_y", "w_z"]) if t <= end]
@@ -68,9 +58,7 @@ def convert(folder, out):
         recording.write("imu0", IMU_FIELDS, imu, imu_yaml("gx5_1, turned to forward, left, up", rate([t for t, _ in imu]),
                                                           (1e-3, 2e-5), (2e-2, 1e-3)))
         recording.write("encoder0", ENCODER_FIELDS, encoder,
-                        "sensor_type: wheel_encoder\ncomment: integrated from the speeds of the two sides\n" +
-                        pose_yaml(IDENTITY) + f"rate_hz: {rate([t for t, _ in encoder]):.0f}\nresolution: {COUNTS}\n"
-                        f"wraps: false\nwheel_radius: [{RADIUS}, {RADIUS}]\nwheel_separation: {TRACK}\n"
-                        "noise_counts: 400.0\n")
+                        encoder_yaml("integrated from the speeds of the two sides", IDENTITY, rate([t for t, _ in encoder]),
+                                     COUNTS, RADIUS, TRACK, 400.0))
         recording.write_truth(truth)
     return ["where the IMU is between the wheels, the track width and the noise are guesses: see the sensor.yaml files"]

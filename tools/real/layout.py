@@ -183,6 +183,21 @@ def quaternion(R):
     return [-v for v in q] if q[0] < 0 else q
 
 
+FLIP = [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]]  # [forward, right, down] to [forward, left, up], and back
+
+
+def trapezoids(rows):
+    """The integrals, from the first row on, of rows (time [ns], values per second): rows of the same times."""
+    sums, result = [0.0] * len(rows[0][1]), []
+    for i, (time, values) in enumerate(rows):
+        if i > 0:
+            before, last = rows[i - 1]
+            half = 0.5e-9 * (time - before)
+            sums = [x + half * (a + b) for x, a, b in zip(sums, last, values)]
+        result.append((time, sums))
+    return result
+
+
 # ---- out ---------------------------------------------------------------------------------------------------------------
 
 IMU_FIELDS = "timestamp [ns],w_x [rad/s],w_y [rad/s],w_z [rad/s],a_x [m/s^2],a_y [m/s^2],a_z [m/s^2]"
@@ -261,6 +276,13 @@ def imu_yaml(comment, rate_hz, gyroscope, accelerometer):
     return (f"sensor_type: imu\ncomment: {comment}\n" + pose_yaml(IDENTITY) + f"rate_hz: {rate_hz:g}\n"
             f"gyroscope_noise_density: {gyroscope[0]:.3e}\ngyroscope_random_walk: {gyroscope[1]:.3e}\n"
             f"accelerometer_noise_density: {accelerometer[0]:.3e}\naccelerometer_random_walk: {accelerometer[1]:.3e}\n")
+
+
+def encoder_yaml(comment, T_BS, rate_hz, counts, radius, track, noise):
+    """`counts` of a revolution; `radius`, `track` [m]; `noise` [counts]."""
+    return (f"sensor_type: wheel_encoder\ncomment: {comment}\n" + pose_yaml(T_BS) + f"rate_hz: {rate_hz:.0f}\n"
+            f"resolution: {counts}\nwraps: false\nwheel_radius: [{radius}, {radius}]\nwheel_separation: {track}\n"
+            f"noise_counts: {noise}\n")
 
 
 def camera_yaml(comment, rate_hz, T_BS, size, intrinsics, distortion):

@@ -3,7 +3,7 @@
 Four wheels, skid-steered: those of one side count together. The stamps are those of arrival, of wheels and IMU alike. The
 effective track width is that by which wheels and gyroscope agree; by ruler it is 0.394 m. The noise of the IMU is a guess."""
 
-from real.layout import (ENCODER_FIELDS, IDENTITY, IMU_FIELDS, BadInput, Recording, growing, imu_yaml, pose_yaml, rate,
+from real.layout import (ENCODER_FIELDS, IDENTITY, IMU_FIELDS, BadInput, Recording, encoder_yaml, growing, imu_yaml, rate,
                          read_archive)
 
 RADIUS = 0.127  # [m] by ruler
@@ -52,7 +52,6 @@ def convert(folder, out):
         recording.write("imu0", IMU_FIELDS, imu,
                         imu_yaml("of a skid-steered robot", rate([t for t, _ in imu]), (1e-3, 2e-5), (2e-2, 1e-3)))
         recording.write("encoder0", ENCODER_FIELDS, encoder,
-                        "sensor_type: wheel_encoder\ncomment: two wheels on each side\n" + pose_yaml(IDENTITY) +
-                        f"rate_hz: {rate([t for t, _ in encoder]):.0f}\nresolution: {COUNTS}\nwraps: false\n"
-                        f"wheel_radius: [{RADIUS}, {RADIUS}]\nwheel_separation: {TRACK}\nnoise_counts: 1.0\n")
+                        encoder_yaml("two wheels on each side", IDENTITY, rate([t for t, _ in encoder]), COUNTS, RADIUS,
+                                     TRACK, 1.0))
     return ["there is no truth; the track width is an effective one, and the noise a guess: see the sensor.yaml files"]
