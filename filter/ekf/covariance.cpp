@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cassert>
 
+#include "filter/ekf/initial_state.h"
 #include "filter/ekf/kernel_matrix.h"
 
 namespace ear {
@@ -99,6 +100,23 @@ void Covariance::append_clone(const Eigen::Matrix<double, 6, 1>& J_offset) {
   corner.noalias() += rows.col(err::time_offset) * J_offset.transpose();
   P_.block<6, 6>(n, n) = 0.5 * (corner + corner.transpose());
   size_ += err::clone_size;
+}
+
+/// With dp = rho - [p]x theta for each pose k and for the body, whose own is taken off: rho_k' = rho_k - rho +
+/// [p]x (theta - theta_k).
+void Covariance::move_origin(const Eigen::Vector3d& p_W) {
+  const Eigen::Matrix3d p_x = skew(p_W);
+  auto P = P_.topLeftCorner(size_, size_);
+  for (int k = err::clones; k < size_; k += err::clone_size) {
+    P.middleRows<3>(k + 3) += p_x * (P.middleRows<3>(err::theta) - P.middleRows<3>(k)) - P.middleRows<3>(err::rho);
+  }
+  P.middleRows<3>(err::rho).setZero();
+  for (int k = err::clones; k < size_; k += err::clone_size) {
+    P.middleCols<3>(k + 3) +=
+        (P.middleCols<3>(err::theta) - P.middleCols<3>(k)) * p_x.transpose() - P.middleCols<3>(err::rho);
+  }
+  P.middleCols<3>(err::rho).setZero();
+  P.diagonal().segment<3>(err::rho).setConstant(kKnownSigma * kKnownSigma);
 }
 
 void Covariance::remove(int first, int count) {

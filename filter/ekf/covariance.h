@@ -40,6 +40,9 @@ class Covariance {
   /// the time offset.
   void append_clone(const Eigen::Matrix<double, 6, 1>& J_offset);
 
+  /// All positions are counted from where the vehicle is now, `p_W` from the origin so far: its own is known then.
+  void move_origin(const Eigen::Vector3d& p_W);
+
   /// Forgets `count` entries from `first` on.
   void remove(int first, int count);
 

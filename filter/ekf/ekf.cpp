@@ -155,6 +155,14 @@ void Ekf::marginalise(std::size_t clone) {
   state_.clones.erase(state_.clones.begin() + static_cast<std::ptrdiff_t>(clone));
 }
 
+void Ekf::move_origin() {
+  const Eigen::Vector3d p_W = state_.imu.p_WB;
+  covariance_.move_origin(p_W);
+  state_.imu.p_WB.setZero();
+  for (Clone& clone : state_.clones) clone.T_WB.p -= p_W;
+  started_W_ -= p_W;
+}
+
 /// A rotation is about the body: by the invariant error, nu = dv + [v]x theta, rho = dp + [p]x theta.
 void Ekf::inflate_motion(double rotation, double velocity, double position) {
   Eigen::Matrix<double, 9, 3> J;

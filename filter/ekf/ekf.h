@@ -79,6 +79,9 @@ class Ekf {
   void clone(double feature_noise);
   void marginalise(std::size_t clone);
 
+  /// The origin of the world is where the body is now, by definition.
+  void move_origin();
+
   /// The vehicle may be turned, faster and elsewhere by these standard deviations [rad, m/s, m], each axis, whatever
   /// was measured so far.
   void inflate_motion(double rotation, double velocity, double position);

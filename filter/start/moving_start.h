@@ -1,5 +1,5 @@
 // Where a filter may begin in a vehicle that moves, in the air or without wheels: velocity, gravity and biases that
-// explain what two cameras and the inertial samples saw over the last second or two. docs/filter.md, "Starts".
+// explain what the cameras and the inertial samples saw over the last second or two. docs/filter.md, "Starts".
 #pragma once
 
 #include <optional>
@@ -10,6 +10,7 @@
 #include "filter/ekf/state.h"
 #include "filter/ingest/imu_buffer.h"
 #include "filter/sources/cameras/stereo_motion.h"
+#include "filter/start/single_camera_start.h"
 
 namespace ear {
 
@@ -19,13 +20,12 @@ inline constexpr double kStartSpan = 1.5;
 /// Keeps the frames of the last seconds, and how the vehicle moved between them.
 class MovingStart {
  public:
-  /// `feature_sigma`: of one observation, normalized.
-  MovingStart(const PriorConfig& prior, double feature_sigma) : prior_(prior), feature_sigma_(feature_sigma) {}
+  MovingStart(const FilterConfig& config, const Calibration& calibration);
 
   struct TimedFrame {
     TimeNs t_ns = 0;  ///< IMU time
     FeatureFrame features;
-    StereoMotion motion;  ///< from the frame before; unused for the first
+    StereoMotion motion;  ///< from the frame before; unused for the first, and with one camera
   };
 
   /// The next frame, at IMU time `t_ns`. Where its motion is not known, what came before is forgotten.
@@ -34,11 +34,12 @@ class MovingStart {
   /// Are the frames kept enough for solve(), from this one on?
   [[nodiscard]] bool spans_enough(std::size_t first = 0) const;
 
-  /// A state at the first frame kept; nothing while the frames span too little, or contradict the inertial samples.
-  /// Least squares over the velocity v and gravity g of that moment, in the body as it then was (B), and the biases:
+  /// A state at the first frame kept; none while the frames span too little, or contradict the inertial samples. With
+  /// two cameras least squares over the velocity v and gravity g of that moment, in the body as it then was (B), and
+  /// the biases:
   ///   p_k+1 - p_k = v dt + g (t_k+1^2 - t_k^2) / 2 + double integral of R f          p_k: from the cameras
   /// It is a point to linearize at, not an estimate: the frames may be used again.
-  [[nodiscard]] std::optional<ImuState> solve(const ImuBuffer& imu) const;
+  [[nodiscard]] StartAttempt solve(const ImuBuffer& imu, const CameraState& cameras) const;
 
   /// The path from the last frame to IMU time `t_ns`, in the body as it was then, at the speed before. Nothing before
   /// two frames.
@@ -48,10 +49,11 @@ class MovingStart {
   void clear() { frames_.clear(); }
 
  private:
-  [[nodiscard]] Eigen::Vector3d gyro_bias(const ImuBuffer& imu) const;
+  [[nodiscard]] StartAttempt by_two_cameras(const ImuBuffer& imu) const;
+  [[nodiscard]] StartFit fit_to_motions(const Eigen::Vector3d& b_g, const ImuBuffer& imu) const;
 
-  PriorConfig prior_;
-  double feature_sigma_;
+  StartNoise noise_;
+  bool stereo_;
   std::vector<TimedFrame> frames_;  ///< oldest first
   StereoMatches matches_;
 };

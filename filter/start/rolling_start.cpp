@@ -5,31 +5,13 @@
 #include "filter/ekf/so3.h"
 #include "filter/ingest/limits.h"
 #include "filter/start/start_fit.h"
+#include "filter/start/start_sums.h"
 
 namespace ear {
 namespace {
 
 constexpr double kSpeedSigma = 0.02;      // [m/s] chosen: the least of a speed
 constexpr double kDirectionSigma = 0.05;  // [rad] chosen: of the velocity in the body, which pitches about the axle
-
-using Fit = StartFit<12>;
-
-/// What the inertial samples add up to since the first moment, in the body frame of then.
-struct Sums {
-  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
-  Eigen::Vector3d gained = Eigen::Vector3d::Zero();         // integral of R f
-  Eigen::Matrix3d R_integral = Eigen::Matrix3d::Zero();     // integral of R
-  Eigen::Matrix3d gained_by_b_g = Eigen::Matrix3d::Zero();  // derivative of `gained`
-
-  void add(const Eigen::Vector3d& gyro_B, const Eigen::Vector3d& accel_B, double dt) {
-    const Eigen::Matrix3d middle = R * exp_so3(0.5 * dt * gyro_B);
-    R_integral += 0.5 * dt * middle;
-    gained += dt * middle * accel_B;
-    gained_by_b_g += dt * skew(middle * accel_B) * R_integral;
-    R_integral += 0.5 * dt * middle;
-    R = R * exp_so3(dt * gyro_B);
-  }
-};
 
 }  // namespace
 
@@ -44,13 +26,11 @@ Reason lacking_for_rolling_start(const ImuBuffer& imu, const Ring<WheelIncrement
   return seconds_between(start_ns, turns.back().to_ns) < min_duration ? Reason::few_readings : Reason::none;
 }
 
-std::optional<ImuState> rolling_start(const ImuBuffer& imu, const Ring<WheelIncrement>& turns,
-                                      const OdometerState& odometer, const PriorConfig& prior, double stamp_sigma) {
+StartAttempt rolling_start(const ImuBuffer& imu, const Ring<WheelIncrement>& turns, const OdometerState& odometer,
+                           const PriorConfig& prior, double stamp_sigma) {
   const TimeNs start_ns = turns.front().from_ns;
-  Fit fit;
-  fit.expect(Fit::gyro_bias, prior.gyro_bias);
-  fit.expect(Fit::accel_bias, prior.accel_bias);
-  Sums sums;
+  StartFit fit(prior);
+  StartSums sums;
   TimeNs now_ns = start_ns;
   for (std::size_t k = 0; k < turns.size(); ++k) {
     const WheelIncrement& turn = turns[k];
@@ -66,20 +46,19 @@ std::optional<ImuState> rolling_start(const ImuBuffer& imu, const Ring<WheelIncr
     const double speed = odometer.wheel_radius.dot(turn.angle) / (2.0 * turn.duration()) +
                          odometer.wheel_radius.mean() * R_BO.col(1).dot(rate);
     const Eigen::Vector3d u = sums.R * (speed * R_BO.col(0) - rate.cross(odometer.T_BO.p));
-    Fit::Rows H;
-    H.middleCols<3>(Fit::velocity).setIdentity();
-    H.middleCols<3>(Fit::gravity) = seconds_between(start_ns, middle_ns) * Eigen::Matrix3d::Identity();
-    H.middleCols<3>(Fit::gyro_bias) = sums.gained_by_b_g - skew(u) * sums.R_integral;
-    H.middleCols<3>(Fit::accel_bias) = -sums.R_integral;
-    const Eigen::Vector3d z = u - sums.gained;
+    StartFit::Rows H = StartFit::Rows::Zero();
+    H.middleCols<3>(StartFit::velocity).setIdentity();
+    H.middleCols<3>(StartFit::gravity) = seconds_between(start_ns, middle_ns) * Eigen::Matrix3d::Identity();
+    H.middleCols<3>(StartFit::gyro_bias) = sums.velocity_by_b_g + skew(u) * sums.R_by_b_g;
+    H.middleCols<3>(StartFit::accel_bias) = sums.velocity_by_b_a();
+    const Eigen::Vector3d z = u - sums.velocity;
     const double direction = std::hypot(kDirectionSigma, std::sqrt(2.0) * stamp_sigma / turn.duration());
     const double sigma = std::hypot(kSpeedSigma, direction * speed);
     fit.add(H, z, sigma * sigma);
   }
-  const std::optional<Fit::Vector> x = fit.solve();
-  if (!x) return std::nullopt;
-  return start_state(start_ns, x->segment<3>(Fit::velocity), x->segment<3>(Fit::gravity), x->segment<3>(Fit::gyro_bias),
-                     x->segment<3>(Fit::accel_bias));
+  const std::optional<StartFit::Vector> x = fit.solve();
+  if (!x) return {std::nullopt, Reason::wheels_contradict};
+  return {start_state(start_ns, *x), Reason::none};
 }
 
 }  // namespace ear

@@ -2,14 +2,13 @@
 // accelerometer and wheels read over the last second or two. docs/filter.md, "Starts".
 #pragma once
 
-#include <optional>
-
 #include "ear/filter_config.h"
 #include "ear/health.h"
 #include "filter/ekf/state.h"
 #include "filter/ingest/imu_buffer.h"
 #include "filter/ingest/ring.h"
 #include "filter/ingest/wheel_increment.h"
+#include "filter/start/start_fit.h"
 
 namespace ear {
 
@@ -17,12 +16,11 @@ namespace ear {
 /// body as it then was (B), and the biases:
 ///   R_Bk u_k = v + g t_k + integral of R f,      u_k: the body's velocity that the wheels measure, along the
 ///   odometer's x
-/// It is a point to linearize at, not an estimate: the samples may be used again. Nothing if the turns contradict the
-/// inertial samples, as they do in the air or on slipping wheels. They must be all that lacking_for_rolling_start()
-/// asks for. `stamp_sigma` [s]: of one reading of the wheels.
-[[nodiscard]] std::optional<ImuState> rolling_start(const ImuBuffer& imu, const Ring<WheelIncrement>& turns,
-                                                    const OdometerState& odometer, const PriorConfig& prior,
-                                                    double stamp_sigma);
+/// It is a point to linearize at, not an estimate: the samples may be used again. It lacks wheels_contradict if the
+/// turns contradict the inertial samples, as they do in the air or on slipping wheels. They must be all that
+/// lacking_for_rolling_start() asks for. `stamp_sigma` [s]: of one reading of the wheels.
+[[nodiscard]] StartAttempt rolling_start(const ImuBuffer& imu, const Ring<WheelIncrement>& turns,
+                                         const OdometerState& odometer, const PriorConfig& prior, double stamp_sigma);
 
 /// What the readings lack for a rolling start: Reason::none if the turns follow each other up to `now_ns` or shortly
 /// before, span `min_duration` [s], and the inertial samples reach back to the first.

@@ -1,5 +1,6 @@
 #include "filter/start/start.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
@@ -48,9 +49,7 @@ GivenStart checked(const GivenStart& given) {
 }
 
 Start::Start(const FilterConfig& config, const Calibration& calibration)
-    : config_(config),
-      calibration_(calibration),
-      moving_(config.prior, config.feature_sigma_px / focal_length(calibration)) {}
+    : config_(config), calibration_(calibration), moving_(config, calibration) {}
 
 bool Start::scale_is_given() const {
   return uses_wheels(config_, calibration_) && config_.online_calibration.wheels && !has_beams(calibration_) &&
@@ -70,10 +69,10 @@ std::optional<StartState> Start::find(const Situation& now, const Ingest& ingest
     const Ring<WheelIncrement>& turns = ingest.waiting_increments();
     lacks = lacking_for_rolling_start(ingest.imu(), turns, now.t_ns, kStartSpan);
     if (lacks == Reason::none) {
-      const std::optional<ImuState> x = rolling_start(ingest.imu(), turns, odometer_state(calibration_), config_.prior,
-                                                      calibration_.encoder->stamp_sigma);
-      if (x) start = in_motion(*x);
-      lacks = Reason::wheels_contradict;
+      const StartAttempt attempt = rolling_start(ingest.imu(), turns, odometer_state(calibration_), config_.prior,
+                                                 calibration_.encoder->stamp_sigma);
+      lacks = attempt.lacks;
+      if (attempt.x) start = in_motion(attempt);
     }
   }
   if (start) return start;
@@ -81,19 +80,19 @@ std::optional<StartState> Start::find(const Situation& now, const Ingest& ingest
   // A first start can wait for the vehicle to stand, which shows gravity and biases better, or to move.
   const bool waits = start && !now.restarts && start->x.v_W.norm() < kLeastStartSpeed;
   if (waits) waits_for_ = Reason::slow;
-  if (calibration_.cameras.size() < 2 || lacks == Reason::other_gravity || now.rolls) waits_for_ = lacks;
+  if (calibration_.cameras.empty() || lacks == Reason::other_gravity || now.rolls) waits_for_ = lacks;
   return waits ? std::nullopt : start;
 }
 
 std::optional<StartState> Start::moving(const Situation& now, const ImuBuffer& imu) {
-  waits_for_ = calibration_.cameras.size() < 2 ? Reason::moves_unseen : Reason::few_frames;
-  if (calibration_.cameras.size() < 2 || now.frame.features.empty()) return std::nullopt;
+  waits_for_ = calibration_.cameras.empty() ? Reason::moves_unseen : Reason::few_frames;
+  if (calibration_.cameras.empty() || now.frame.features.empty()) return std::nullopt;
   moving_.add(now.t_ns, now.frame, imu, camera_state(calibration_));
-  if (moving_.spans_enough()) waits_for_ = Reason::cameras_contradict;
   if (now.lost && !now.contradicted) return std::nullopt;
-  const std::optional<ImuState> x = moving_.solve(imu);
-  if (!x) return std::nullopt;
-  StartState start = in_motion(*x);
+  const StartAttempt attempt = moving_.solve(imu, camera_state(calibration_));
+  waits_for_ = attempt.lacks;
+  if (!attempt.x) return std::nullopt;
+  StartState start = in_motion(attempt);
   start.from_frames = true;
   return start;
 }
@@ -108,7 +107,7 @@ MapAlignment Start::begin(const StartState& start, const std::optional<Estimate>
     alignment = *start.alignment;
     given_.reset();
   } else {
-    if (start.residual.size() > 0) ingest.drop_readings();  // of the time when it stood
+    if (start.residual.size() > 0 && !start.from_frames) ingest.drop_readings();  // of the time when it stood
     if (last_good) {
       alignment = align_after_restart(*last_good, ekf.state().imu, ingest.imu(), calibration_.imu.gyro_noise);
     }
@@ -122,6 +121,7 @@ MapAlignment Start::begin(const StartState& start, const std::optional<Estimate>
       sources.update(&frame.features, false, advice, ekf, records);
     }
     records.statistics = statistics;
+    if (!last_good) ekf.move_origin();
   }
   forget_frames();
   return alignment;
@@ -177,13 +177,25 @@ std::optional<StartState> Start::standing(TimeNs t_ns, const ImuStatistics& imu)
   return start;
 }
 
-/// `x` is where the linearisation starts, not an estimate: the velocity is as good as unknown.
-StartState Start::in_motion(const ImuState& x) const {
+/// The samples of the fit are used again: it only says where the filter is to be linear, so the velocity is as good as
+/// unknown. With one camera the filter would then learn the length of the path from its own errors of linearisation:
+/// the fit says roughly what it is. dv_B = R^T nu, dg_B = R^T [g]x theta.
+StartState Start::in_motion(const StartAttempt& attempt) const {
+  constexpr double kRoughly = 2.0;  // chosen: times the standard deviations of the fit
   StartState start;
-  start.x = x;
+  start.x = *attempt.x;
   start.sigma = sigma();
-  start.sigma.segment<3>(err::nu).setConstant(kMovingVelocity * (1.0 + x.v_W.norm()));
-  start.H.resize(0, err::imu_size);
+  start.sigma.segment<3>(err::nu).setConstant(kMovingVelocity * (1.0 + start.x.v_W.norm()));
+  if (!attempt.information) return start;
+  const Eigen::Matrix3d R_BW = start.x.R_WB.transpose();
+  Eigen::Matrix<double, StartFit::motion_size, err::imu_size> J;
+  J.setZero();
+  J.block<3, 3>(StartFit::velocity, err::nu) = R_BW;
+  J.block<3, 3>(StartFit::gravity, err::theta) = R_BW * skew(kGravity_W);
+  J.block<3, 3>(StartFit::gyro_bias, err::b_g).setIdentity();
+  J.block<3, 3>(StartFit::accel_bias, err::b_a).setIdentity();
+  start.H = attempt.information->llt().matrixU() * J / kRoughly;
+  start.residual.setZero(StartFit::motion_size);
   return start;
 }
 

@@ -22,7 +22,8 @@ struct StartState {
   ImuState x;
   Eigen::VectorXd sigma;  ///< standard deviations of the whole error vector
   /// What the mean samples show of attitude and biases of a vehicle that stands, or what was given of the velocity,
-  /// whitened: residual = H e + n, by the inertial part. No rows for the other starts.
+  /// whitened: residual = H e + n, by the inertial part. Roughly what a start in motion with one camera
+  /// is.
   Eigen::Matrix<double, Eigen::Dynamic, err::imu_size> H;
   Eigen::VectorXd residual;
   bool from_frames = false;  ///< in motion, at the first of the frames kept: all of them are to be taken in
@@ -71,7 +72,7 @@ class Start {
   [[nodiscard]] std::optional<StartState> moving(const Situation& now, const ImuBuffer& imu);
   [[nodiscard]] std::optional<StartState> standing(TimeNs t_ns, const ImuStatistics& imu) const;
   [[nodiscard]] Eigen::VectorXd sigma() const;
-  [[nodiscard]] StartState in_motion(const ImuState& x) const;
+  [[nodiscard]] StartState in_motion(const StartAttempt& attempt) const;
 
   FilterConfig config_;
   Calibration calibration_;

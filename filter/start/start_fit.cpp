@@ -2,49 +2,77 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
+#include <cmath>
 
 namespace ear {
+namespace {
 
-template <int N>
-double StartFit<N>::free_gravity() const {
-  const Vector x = A_.ldlt().solve(b_);
-  return x.template segment<3>(gravity).norm();
+constexpr double kSizeSigma = 0.01;  // [m/s^2] chosen: of gravity's known size
+
+}  // namespace
+
+StartFit::StartFit(const PriorConfig& prior, const Vector& x) {
+  Vector sigma;
+  sigma << Eigen::Matrix<double, 6, 1>::Constant(HUGE_VAL), Eigen::Vector3d::Constant(prior.gyro_bias),
+      Eigen::Vector3d::Constant(prior.accel_bias), Eigen::Vector3d::Constant(prior.camera_rotation), prior.time_offset;
+  prior_information_ = sigma.array().square().inverse();
+  A_ = prior_information_.asDiagonal();
+  b_ = -prior_information_.cwiseProduct(x);
 }
 
-/// Gravity's size is a row along its present direction, again as the direction gets better.
-template <int N>
-std::optional<Eigen::Matrix<double, N, 1>> StartFit<N>::solve() const {
-  constexpr double kSigma = 0.01;    // [m/s^2] chosen: of the known size
-  constexpr double kWorstFit = 2.0;  // chosen: root mean square residual, in standard deviations
-  constexpr int kIterations = 3;     // chosen
+double StartFit::free_gravity() const {
+  const Vector x = A_.ldlt().solve(b_);
+  return x.segment<3>(gravity).norm();
+}
+
+StartFit::Matrix StartFit::information(const Vector& x) const {
+  const Eigen::Vector3d along = x.segment<3>(gravity).normalized() / kSizeSigma;
+  Matrix A = A_;
+  A.block<3, 3>(gravity, gravity) += along * along.transpose();
+  return A;
+}
+
+StartFit::MotionMatrix StartFit::motion_information(const Vector& x) const {
+  constexpr int rest = size - motion_size;
+  const Matrix A = information(x);
+  const auto shared = A.topRightCorner<motion_size, rest>();
+  return A.topLeftCorner<motion_size, motion_size>() -
+         shared * A.bottomRightCorner<rest, rest>().ldlt().solve(shared.transpose());
+}
+
+/// Gravity's size is a row along its direction in x.
+StartFit::Vector StartFit::step(const Vector& x, const Vector& b) const {
+  const Eigen::Vector3d g = x.segment<3>(gravity);
+  Vector rhs = b;
+  rhs.segment<3>(gravity) += g.normalized() * ((-kGravity_W.z() - g.norm()) / (kSizeSigma * kSizeSigma));
+  return information(x).ldlt().solve(rhs);
+}
+
+/// Again as gravity's direction gets better.
+StartFit::Vector StartFit::solution() const {
+  constexpr int kIterations = 3;  // chosen
   Vector x = A_.ldlt().solve(b_);
-  for (int i = 0; i < kIterations; ++i) {
-    const Eigen::Vector3d along = x.template segment<3>(gravity).normalized() / kSigma;
-    Eigen::Matrix<double, N, N> with_gravity = A_;
-    with_gravity.template block<3, 3>(gravity, gravity) += along * along.transpose();
-    Vector rhs = b_;
-    rhs.template segment<3>(gravity) += along * (-kGravity_W.z() / kSigma);
-    x = with_gravity.ldlt().solve(rhs);
-  }
+  for (int i = 0; i < kIterations; ++i) x += step(x, b_ - A_ * x);
+  return x;
+}
+
+std::optional<StartFit::Vector> StartFit::solve() const {
+  const Vector x = solution();
   const double squares = x.dot(A_ * x) - 2.0 * b_.dot(x) + cost_;
   return squares <= kWorstFit * kWorstFit * rows_ ? std::optional(x) : std::nullopt;
 }
-
-template class StartFit<9>;
-template class StartFit<12>;
 
 Eigen::Matrix3d turn_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return Eigen::Quaterniond::FromTwoVectors(a, b).toRotationMatrix();
 }
 
-ImuState start_state(TimeNs t_ns, const Eigen::Vector3d& v_B, const Eigen::Vector3d& gravity_B,
-                     const Eigen::Vector3d& b_g, const Eigen::Vector3d& b_a) {
+ImuState start_state(TimeNs t_ns, const StartFit::Vector& x) {
   ImuState state;
   state.t_ns = t_ns;
-  state.R_WB = turn_between(gravity_B, kGravity_W);
-  state.v_W = state.R_WB * v_B;
-  state.b_g = b_g;
-  state.b_a = b_a;
+  state.R_WB = turn_between(x.segment<3>(StartFit::gravity), kGravity_W);
+  state.v_W = state.R_WB * x.segment<3>(StartFit::velocity);
+  state.b_g = x.segment<3>(StartFit::gyro_bias);
+  state.b_a = x.segment<3>(StartFit::accel_bias);
   return state;
 }
 

@@ -5,46 +5,80 @@
 #include <Eigen/Core>
 #include <optional>
 
+#include "ear/filter_config.h"
+#include "ear/health.h"
 #include "ear/types.h"
 #include "filter/ekf/state.h"
 
 namespace ear {
 
-/// N unknowns: velocity [m/s], gravity [m/s^2], and biases, the accelerometer's last.
-template <int N>
+/// Chosen: root mean square residual of a start that fits, in standard deviations.
+inline constexpr double kWorstFit = 2.0;
+
+/// Unknowns: velocity [m/s], gravity [m/s^2], biases of gyroscope [rad/s] and accelerometer [m/s^2], in the body of the
+/// first moment; then what a camera's calibration is wrong by, where one shows the motion: a turn, R_BC = Exp(phi) R^
+/// [rad], and the time offset [s].
 class StartFit {
  public:
-  static constexpr int velocity = 0, gravity = 3, gyro_bias = 6, accel_bias = N - 3;  ///< where they begin
-  using Vector = Eigen::Matrix<double, N, 1>;
-  using Rows = Eigen::Matrix<double, 3, N>;
+  static constexpr int velocity = 0, gravity = 3, gyro_bias = 6, accel_bias = 9;  ///< where they begin
+  static constexpr int motion_size = 12;                                          ///< of these
+  static constexpr int camera_rotation = 12, time_offset = 15, size = 16;
+  using Vector = Eigen::Matrix<double, size, 1>;
+  using Matrix = Eigen::Matrix<double, size, size>;
+  using MotionMatrix = Eigen::Matrix<double, motion_size, motion_size>;
+  using Rows = Eigen::Matrix<double, 3, size>;
 
-  /// What is known of a bias before: zero, with this standard deviation, each axis.
-  void expect(int bias, double sigma) { A_.diagonal().template segment<3>(bias).setConstant(1.0 / (sigma * sigma)); }
+  /// Biases and calibration are zero, to within the prior. `x`: where what is added is linearized.
+  explicit StartFit(const PriorConfig& prior, const Vector& x = Vector::Zero());
   /// z = H x + n; `variance` of each n.
   void add(const Rows& H, const Eigen::Vector3d& z, double variance) {
-    A_ += H.transpose() * H / variance;
-    b_ += H.transpose() * z / variance;
+    add(H.transpose() * H / variance, H.transpose() * z / variance);
     cost_ += z.squaredNorm() / variance;
     rows_ += 3.0;
+  }
+  /// Normal equations A x = b.
+  void add(const Matrix& A, const Vector& b) {
+    A_ += A;
+    b_ += b;
   }
 
   /// The size of gravity as the rows alone show it [m/s^2].
   [[nodiscard]] double free_gravity() const;
-  /// Nothing if it does not fit.
+  /// Nothing if the rows do not fit; they were linear.
   [[nodiscard]] std::optional<Vector> solve() const;
+  /// The same whether they fit or not.
+  [[nodiscard]] Vector solution() const;
+  /// From x on, where what was added is linearized, gravity's known size included.
+  [[nodiscard]] Vector step(const Vector& x) const { return step(x, b_); }
+  /// The inverse of the covariance, likewise: of all, and of the motion alone.
+  [[nodiscard]] Matrix information(const Vector& x) const;
+  [[nodiscard]] MotionMatrix motion_information(const Vector& x) const;
+  /// Are biases and calibration within so many standard deviations of the prior?
+  [[nodiscard]] bool expected(const Vector& x, double sigmas) const {
+    return (x.array().square() * prior_information_.array()).maxCoeff() <= sigmas * sigmas;
+  }
 
  private:
-  Eigen::Matrix<double, N, N> A_ = Eigen::Matrix<double, N, N>::Zero();
-  Vector b_ = Vector::Zero();
+  [[nodiscard]] Vector step(const Vector& x, const Vector& b) const;
+
+  Vector prior_information_;
+  Matrix A_;
+  Vector b_;
   double cost_ = 0.0;
   double rows_ = 0.0;
+};
+
+/// Of a start in motion: a state to linearize at, or what it lacks.
+struct StartAttempt {
+  std::optional<ImuState> x;
+  Reason lacks = Reason::none;
+  std::optional<StartFit::MotionMatrix> information = std::nullopt;  ///< the inverse of its covariance, if known
 };
 
 /// The shortest turn that takes the direction of `a` to that of `b`; neither is zero.
 [[nodiscard]] Eigen::Matrix3d turn_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b);
 
-/// With velocity `v_B` and gravity `gravity_B` in the body at `t_ns`.
-[[nodiscard]] ImuState start_state(TimeNs t_ns, const Eigen::Vector3d& v_B, const Eigen::Vector3d& gravity_B,
-                                   const Eigen::Vector3d& b_g, const Eigen::Vector3d& b_a);
+/// The state at `t_ns` with these unknowns, gravity pointing down.
+[[nodiscard]] ImuState start_state(TimeNs t_ns, const StartFit::Vector& x);
 
 }  // namespace ear

@@ -25,7 +25,7 @@ enum class Reason : std::uint8_t {
   no_frame,       ///< neither an image came nor a step was asked for, that inertial samples reach
   few_samples,    ///< inertial samples are missing
   other_gravity,  ///< it stands, but the mean specific force is not gravity: another unit, or a broken sensor
-  moves_unseen,   ///< it moves, and neither two cameras nor wheels on the ground show how far
+  moves_unseen,   ///< it moves, and nothing shows how far: see docs/health.md
   few_readings,   ///< it rolls: the wheels' readings do not yet span the time that a start takes
   wheel_gaps,     ///< it rolls: readings of the wheels are missing, or more than 0.5 s apart (0.25 s where counts wrap)
   wheels_contradict,   ///< it rolls: wheels and inertial samples show different motions, as with slip

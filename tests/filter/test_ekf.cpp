@@ -302,3 +302,30 @@ TEST_CASE("ekf: at the start the product of baseline and focal length is known, 
   CHECK(P(err::stereo + 4, err::stereo + 4) == doctest::Approx(25e-8));  // across the baseline nothing changes
   CHECK((P - P.transpose()).norm() == 0.0);
 }
+
+TEST_CASE("ekf: with the origin moved to the body, errors are those of the positions from there") {
+  Ekf ekf = started();
+  for (int i = 0; i < 2; ++i) {
+    ekf.clone(1.0);
+    ekf.propagate(samples(), kStart + 200'000'000 * (i + 1), {1.0, 1.0}, 0.0);
+  }
+  const State before = ekf.state();
+  const Eigen::MatrixXd P = ekf.covariance().matrix();
+  ekf.move_origin();
+  const auto moved = [](State x) {
+    const Eigen::Vector3d p = x.imu.p_WB;
+    x.imu.p_WB.setZero();
+    for (Clone& clone : x.clones) clone.T_WB.p -= p;
+    return x;
+  };
+  Eigen::MatrixXd J(P.rows(), P.cols());
+  constexpr double kStep = 1e-6;
+  for (Eigen::Index i = 0; i < P.cols(); ++i) {
+    const State truth = test::with_error(before, kStep * Eigen::VectorXd::Unit(P.cols(), i));
+    J.col(i) = test::boxminus(moved(truth), moved(before)) / kStep;
+  }
+  const Eigen::MatrixXd expected = J * P * J.transpose();
+  CHECK((ekf.covariance().matrix() - expected).cwiseAbs().maxCoeff() < 1e-5);
+  CHECK(ekf.state().imu.p_WB.isZero(0.0));
+  CHECK((ekf.state().clones[0].T_WB.p - moved(before).clones[0].T_WB.p).norm() < 1e-12);
+}

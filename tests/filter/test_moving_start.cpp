@@ -37,7 +37,7 @@ std::optional<ImuState> start(const simulator::Simulation& simulation, double fr
   for (const ImuSample& sample : simulation.imu()) {
     if (sample.t_ns >= begin_ns - 20'000'000 && sample.t_ns <= end_ns + 20'000'000) imu.push(sample);
   }
-  MovingStart moving(PriorConfig{}, 0.6 / 385.0);
+  MovingStart moving(FilterConfig{}, simulation.calibration());
   const CameraState cameras = cameras_of(simulation.calibration());
   for (std::size_t i = 0; i < simulation.frame_times().size(); ++i) {
     const TimeNs t_ns = simulation.frame_times()[i];
@@ -45,7 +45,7 @@ std::optional<ImuState> start(const simulator::Simulation& simulation, double fr
     FeatureFrame frame = simulation.tracks(i);
     change(frame);
     moving.add(t_ns, frame, imu, cameras);
-    if (auto state = moving.solve(imu)) return state;
+    if (auto state = moving.solve(imu, cameras).x) return state;
   }
   return std::nullopt;
 }

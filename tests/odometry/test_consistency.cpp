@@ -80,8 +80,10 @@ FilterConfig simulated_noise(const Case& setup, const simulator::Options& option
   config.online_calibration.time_offset = setup.calibrate;
   config.online_calibration.wheels = setup.calibrate;
   config.online_calibration.odometer_rotation = setup.calibrate;
-  config.online_calibration.axle = config.online_calibration.beam_offset =
-      false;  // the simulator draws no errors of them
+  // The simulator draws no errors of these.
+  config.online_calibration.axle = config.online_calibration.beam_offset = config.online_calibration.intrinsics = false;
+  config.prior.gyro_scale = 1e-6;
+  config.odometer.scores = config.anomaly.enabled = false;  // the noise is known: nothing is inflated
   // The priors are the distribution that the simulator draws from: a fixed size in a random direction, per axis.
   config.prior.accel_bias = 0.03;
   config.prior.camera_rotation = 0.2 * M_PI / 180.0 / std::sqrt(3.0);

@@ -286,16 +286,44 @@ TEST_CASE("start given: before its time, after the samples, and while there is a
                        std::invalid_argument);
 }
 
+TEST_CASE("start: one camera in flight, with a calibration as wrong as real ones are") {
+  double nees_position = 0.0, nees_rotation = 0.0, runs = 0.0;
+  for (const std::uint64_t seed : {951U, 952U, 953U}) {
+    const simulator::Simulation simulation = simulate("fly1", seed, 30.0, 1.0);
+    for (const double from : {8.0, 13.0}) {
+      CAPTURE(seed);
+      CAPTURE(from);
+      Vehicle vehicle;
+      vehicle.from = from;
+      vehicle.cameras = 1;
+      vehicle.wheels = false;
+      const Outcome outcome = run(simulation, vehicle);
+      CHECK(outcome.first < 8.0);
+      CHECK(outcome.lost == 0);
+      CHECK(outcome.scale == doctest::Approx(1.0).epsilon(0.05));
+      nees_position += outcome.nees_position;
+      nees_rotation += outcome.nees_rotation;
+      runs += 1.0;
+    }
+  }
+  MESSAGE("mean NEES ", nees_position / runs, " and ", nees_rotation / runs);
+  CHECK(nees_position / runs < 9.0);
+  CHECK(nees_rotation / runs < 9.0);
+}
+
 TEST_CASE("start: why there is none, in words") {
   const simulator::Simulation simulation = simulate("flat1", 923, 12.0);
   Vehicle vehicle;
   vehicle.from = 6.5;
   vehicle.cameras = 1;
   vehicle.wheels = false;
-  CHECK(run(simulation, vehicle).reason == Reason::moves_unseen);
+  const simulator::Simulation brief = simulate("flat1", 923, 10.0);
+  vehicle.from = 8.0;
+  CHECK(run(brief, vehicle).reason == Reason::moves_unseen);
   vehicle.wheels = true;
   vehicle.encoder_every = 30;  // 3.3 Hz: with counts that wrap nobody knows how far the wheels turned
-  CHECK(run(simulation, vehicle).reason == Reason::wheel_gaps);
+  CHECK(run(brief, vehicle).reason == Reason::wheel_gaps);
+  vehicle.from = 6.5;
   vehicle.encoder_every = 1;
   vehicle.from = 11.0;
   CHECK(run(simulation, vehicle).reason == Reason::few_readings);

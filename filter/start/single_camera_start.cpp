@@ -1,0 +1,411 @@
+#include "filter/start/single_camera_start.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "filter/ekf/so3.h"
+#include "filter/sources/cameras/triangulation.h"
+
+namespace ear {
+namespace {
+
+constexpr std::size_t kMoments = 12;         // chosen: frames that are used, evenly spaced
+constexpr std::size_t kFewestSightings = 4;  // chosen: of a point
+constexpr std::size_t kFewestPoints = 15;    // chosen
+constexpr int kIterations = 20;              // chosen
+constexpr double kHuber = 2.0;               // [standard deviations] chosen
+constexpr double kOutlier = 5.0;             // [standard deviations] chosen: no noise
+constexpr double kSettled = 1e-3;            // [m/s] chosen
+constexpr double kWorstVariance = 2.0;       // chosen: of the observations, times the usual one
+constexpr double kWorstScale = 0.05;         // chosen: standard deviation of the path's length, as a share
+
+struct Sight {
+  std::size_t moment;
+  Eigen::Vector2d uv;
+};
+struct Point {
+  std::vector<Sight> sights;
+  Eigen::Vector3d value = Eigen::Vector3d::Zero();  // as image_of() takes it
+  bool in_front = true;
+};
+
+/// The points that enough of the frames see.
+std::vector<Point> points_of(const std::vector<SeenFrame>& frames, const LensError& lens) {
+  std::map<std::uint64_t, Point> by_id;
+  for (std::size_t k = 0; k < frames.size(); ++k) {
+    for (const FeatureObservation& o : frames[k].features->features) {
+      by_id[o.id].sights.push_back({k, lens.corrected(o.left)});
+    }
+  }
+  std::vector<Point> points;
+  for (auto& [id, point] : by_id) {
+    if (point.sights.size() >= kFewestSightings) points.push_back(std::move(point));
+  }
+  return points;
+}
+
+/// Normal equations of one point, and of it with the other unknowns.
+struct PointSums {
+  Eigen::Matrix3d A;
+  Eigen::Vector3d b;
+  Eigen::Matrix<double, Eigen::Dynamic, 3> A_others;
+
+  void clear(Eigen::Index others) {
+    A.setZero();
+    b.setZero();
+    A_others.setZero(others, 3);
+  }
+  [[nodiscard]] Eigen::Vector3d step(const Eigen::VectorXd& others) const {
+    return A.ldlt().solve(b - A_others.transpose() * others);
+  }
+};
+
+/// Normal equations of the unknowns that the points share: the state, then the errors of the positions.
+struct SharedSums {
+  Eigen::MatrixXd A;
+  Eigen::VectorXd b;
+
+  explicit SharedSums(Eigen::Index size) : A(Eigen::MatrixXd::Zero(size, size)), b(Eigen::VectorXd::Zero(size)) {}
+  /// The point is where it fits best.
+  void eliminate(PointSums& point) {
+    point.A.diagonal().array() += 1e-9 * point.A.trace();  // a point at infinity has some depth
+    const Eigen::LDLT<Eigen::Matrix3d> of_A(point.A);
+    A.noalias() -= point.A_others * of_A.solve(point.A_others.transpose());
+    b -= point.A_others * of_A.solve(point.b);
+  }
+};
+
+class Problem {
+ public:
+  Problem(const std::vector<SeenFrame>& frames, const ImuBuffer& imu, const CameraState& camera,
+          const StartNoise& noise)
+      : imu_(imu),
+        T_BC_(camera.T_BC0),
+        noise_(noise),
+        points_(points_of(frames, camera.lens_error[0])),
+        sums_(points_.size()),
+        errors_(Eigen::VectorXd::Zero(3 * static_cast<Eigen::Index>(frames.size()) - 3)),
+        fit_(noise.prior) {
+    for (const SeenFrame& frame : frames) times_.push_back(frame.t_ns);
+  }
+
+  [[nodiscard]] StartAttempt solve() {
+    if (points_.size() < kFewestPoints) return {std::nullopt, Reason::few_frames};
+    find_gyro_bias();
+    guess();
+    errors_information_ = path_noise(times_, x_, imu_, noise_.imu).inverse();
+    double step = HUGE_VAL;
+    for (int i = 0; i < kIterations && step > kSettled; ++i) step = iterate();
+    const bool settled = step <= kSettled;
+    if (settled && !fits()) return {std::nullopt, Reason::cameras_contradict};
+    if (!settled || !shows_length()) return {std::nullopt, Reason::moves_unseen};
+    return {start_state(times_.front(), x_), Reason::none, fit_.motion_information(x_)};
+  }
+
+ private:
+  void find_gyro_bias();
+  void add_turn(std::size_t k, Eigen::Matrix3d& A, Eigen::Vector3d& b) const;
+  void guess();
+  double iterate();
+  [[nodiscard]] bool fits() const;
+  [[nodiscard]] bool shows_length() const;
+  void integrate();
+  [[nodiscard]] Eigen::Matrix3d R_BC() const { return exp_so3(x_.segment<3>(StartFit::camera_rotation)) * T_BC_.R; }
+
+  const ImuBuffer& imu_;
+  Pose T_BC_;
+  const StartNoise& noise_;
+  std::vector<TimeNs> times_;
+  std::vector<Point> points_;
+  std::vector<StartMoment> moments_;
+  std::vector<PointSums> sums_;
+  StartFit::Vector x_ = StartFit::Vector::Zero();
+  Eigen::VectorXd errors_;  ///< of the positions but the first [m]
+  Eigen::MatrixXd errors_information_;
+  StartFit fit_;  ///< of the last iteration
+};
+
+void Problem::integrate() {
+  moments_ = start_moments(times_, x_, imu_);
+  for (std::size_t k = 1; k < moments_.size(); ++k) {
+    moments_[k].error = errors_.segment<3>(3 * static_cast<Eigen::Index>(k) - 3);
+  }
+}
+
+/// Two rays to a point and the way between their frames lie in one plane, however far the point is. Gauss-Newton.
+void Problem::find_gyro_bias() {
+  const double prior = 1.0 / (noise_.prior.gyro_bias * noise_.prior.gyro_bias);
+  auto b_g = x_.segment<3>(StartFit::gyro_bias);
+  for (int i = 0; i < kIterations; ++i) {
+    integrate();
+    Eigen::Matrix3d A = prior * Eigen::Matrix3d::Identity();
+    Eigen::Vector3d b = -prior * b_g;
+    for (std::size_t k = 1; k < moments_.size(); ++k) add_turn(k, A, b);
+    const Eigen::Vector3d step = A.ldlt().solve(b);
+    b_g += step;
+    if (step.norm() < kSettled * noise_.prior.gyro_bias) break;
+  }
+}
+
+/// Frames k - 1 and k. The way is the direction most nearly perpendicular to all normals.
+void Problem::add_turn(std::size_t k, Eigen::Matrix3d& A, Eigen::Vector3d& b) const {
+  const auto ray = [&](const Sight& sight) {
+    return Eigen::Vector3d(moments_[sight.moment].sums.R * (R_BC() * sight.uv.homogeneous().normalized()));
+  };
+  std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> rays;
+  Eigen::Matrix3d normals = Eigen::Matrix3d::Zero();
+  for (const Point& point : points_) {
+    for (std::size_t j = 1; j < point.sights.size(); ++j) {
+      if (point.sights[j - 1].moment != k - 1 || point.sights[j].moment != k) continue;
+      rays.emplace_back(ray(point.sights[j - 1]), ray(point.sights[j]));
+      const Eigen::Vector3d n = rays.back().first.cross(rays.back().second);
+      normals += n * n.transpose();
+    }
+  }
+  const Eigen::Vector3d way = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(normals).eigenvectors().col(0);
+  const Eigen::Matrix3d turn = moments_[k].sums.R_by_b_g - moments_[k - 1].sums.R_by_b_g;
+  const double sigma = std::sqrt(2.0) * noise_.feature_sigma;
+  for (const auto& [from, to] : rays) {
+    const double r = way.dot(from.cross(to));
+    const Eigen::RowVector3d J = -way.transpose() * skew(from) * skew(to) * turn;
+    const double weight = std::min(1.0, kHuber * sigma / std::abs(r)) / (sigma * sigma);
+    A += weight * J.transpose() * J;
+    b -= weight * r * J.transpose();
+  }
+}
+
+/// The first guess, without errors: with the gyroscope's bias known, each row times its depth is linear in all others,
+/// of a point P (uv h.z - h.xy) = 0, h = R_CB (P - p - R p_BC).
+void Problem::guess() {
+  integrate();
+  SharedSums shared(StartFit::size);
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    PointSums& sums = sums_[i];
+    sums.clear(StartFit::size);
+    for (const Sight& sight : points_[i].sights) {
+      const StartMoment& k = moments_[sight.moment];
+      const Eigen::Matrix3d R_CB = (k.sums.R * T_BC_.R).transpose();
+      const Eigen::Matrix<double, 2, 3> J = R_CB.topRows<2>() - sight.uv * R_CB.row(2);
+      Eigen::Matrix<double, 2, StartFit::size> J_x = -J * k.position_by_state();
+      J_x.middleCols<3>(StartFit::gyro_bias).setZero();
+      const Eigen::Vector2d r = J * (k.sums.position + k.sums.R * T_BC_.p);
+      sums.A += J.transpose() * J;
+      sums.b += J.transpose() * r;
+      sums.A_others += J_x.transpose() * J;
+      shared.A += J_x.transpose() * J_x;
+      shared.b += J_x.transpose() * r;
+    }
+    shared.eliminate(sums);
+  }
+  const double weight = 1.0 / (noise_.feature_sigma * noise_.feature_sigma);
+  StartFit fit(noise_.prior);
+  fit.add(weight * shared.A, weight * shared.b);
+  const StartFit::Vector step = fit.solution();
+  x_ += step;
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    const Eigen::Vector3d h = T_BC_.R.transpose() * (sums_[i].step(step) - T_BC_.p);
+    points_[i].value << h.head<2>() / h.z(), 1.0 / h.z();
+    points_[i].in_front = h.allFinite() && h.z() > kLeastDepth;
+  }
+}
+
+/// Returns the step of the velocity [m/s].
+double Problem::iterate() {
+  integrate();
+  constexpr Eigen::Index n = StartFit::size;
+  SharedSums shared(n + errors_.size());
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    Point& point = points_[i];
+    PointSums& sums = sums_[i];
+    sums.clear(shared.b.size());
+    for (const Sight& sight : point.sights) {
+      const PointImage image = image_of(point.value, x_, moments_[sight.moment], T_BC_);
+      point.in_front = point.in_front && image.depth > kLeastDepth;
+      if (!point.in_front) break;
+      const Eigen::Vector2d r = sight.uv - image.uv;
+      const double weight =
+          std::min(1.0, kHuber * noise_.feature_sigma / r.norm()) / (noise_.feature_sigma * noise_.feature_sigma);
+      const Eigen::Matrix<double, StartFit::size, 2> by_state = weight * image.by_state.transpose();
+      const Eigen::Matrix<double, 3, 2> by_position = weight * image.by_position.transpose();
+      sums.A += weight * image.by_point.transpose() * image.by_point;
+      sums.b += weight * image.by_point.transpose() * r;
+      sums.A_others.topRows<n>() += by_state * image.by_point;
+      shared.A.topLeftCorner<n, n>() += by_state * image.by_state;
+      shared.b.head<n>() += by_state * r;
+      if (sight.moment == 0) continue;
+      const Eigen::Index at = n + 3 * static_cast<Eigen::Index>(sight.moment) - 3;
+      sums.A_others.middleRows<3>(at) += by_position * image.by_point;
+      shared.A.block<3, n>(at, 0) += by_position * image.by_state;
+      shared.A.block<3, 3>(at, at) += by_position * image.by_position;
+      shared.b.segment<3>(at) += by_position * r;
+    }
+    if (!point.in_front) continue;  // its rows so far are few
+    shared.eliminate(sums);
+  }
+  const Eigen::Index m = errors_.size();
+  Eigen::MatrixXd A_e = shared.A.bottomRightCorner(m, m) + errors_information_;
+  const Eigen::MatrixXd A_ex = shared.A.bottomLeftCorner(m, n);
+  const Eigen::VectorXd b_e = shared.b.tail(m) - errors_information_ * errors_;
+  const Eigen::LDLT<Eigen::MatrixXd> of_A_e(A_e);
+  fit_ = StartFit(noise_.prior, x_);
+  fit_.add(shared.A.topLeftCorner<n, n>() - A_ex.transpose() * of_A_e.solve(A_ex),
+           shared.b.head<n>() - A_ex.transpose() * of_A_e.solve(b_e));
+  Eigen::VectorXd step(n + m);
+  step.head<n>() = fit_.step(x_);
+  step.tail(m) = of_A_e.solve(b_e - A_ex * step.head<n>());
+  x_ += step.head<n>();
+  errors_ += step.tail(m);
+  for (std::size_t i = 0; i < points_.size(); ++i) points_[i].value += sums_[i].step(step);
+  return step.segment<3>(StartFit::velocity).norm();
+}
+
+/// The images, and what was known before.
+bool Problem::fits() const {
+  double squares = 0.0;
+  double rows = 0.0;
+  std::size_t fitting = 0;
+  for (const Point& point : points_) {
+    double worst = 0.0;
+    for (const Sight& sight : point.sights) {
+      const PointImage image = image_of(point.value, x_, moments_[sight.moment], T_BC_);
+      const double r = image.depth > kLeastDepth ? (sight.uv - image.uv).norm() / noise_.feature_sigma : HUGE_VAL;
+      worst = std::max(worst, r);
+      squares += std::pow(std::min(r, kOutlier), 2);
+      rows += 2.0;
+    }
+    fitting += worst < kOutlier ? 1 : 0;
+  }
+  const double path_squares = errors_.dot(errors_information_ * errors_);
+  if (!fit_.expected(x_, kOutlier) || path_squares > kOutlier * kOutlier * static_cast<double>(errors_.size())) {
+    return false;
+  }
+  return squares <= kWorstVariance * rows && fitting >= std::max(kFewestPoints, points_.size() / 2);
+}
+
+/// At the farthest of its positions.
+bool Problem::shows_length() const {
+  const auto before = [&](const StartMoment& a, const StartMoment& b) {
+    return a.position(x_).norm() < b.position(x_).norm();
+  };
+  const StartMoment& farthest = *std::max_element(moments_.begin(), moments_.end(), before);
+  const Eigen::Vector3d p = farthest.position(x_);
+  const StartFit::Vector J = farthest.position_by_state().transpose() * p.normalized();
+  return J.dot(fit_.information(x_).ldlt().solve(J)) < std::pow(kWorstScale * p.norm(), 2);
+}
+
+}  // namespace
+
+Eigen::Vector3d StartMoment::position(const StartFit::Vector& x) const {
+  return t * x.segment<3>(StartFit::velocity) + 0.5 * t * t * x.segment<3>(StartFit::gravity) + sums.position + error;
+}
+
+StartFit::Rows StartMoment::position_by_state() const {
+  StartFit::Rows J;
+  J << t * Eigen::Matrix3d::Identity(), 0.5 * t * t * Eigen::Matrix3d::Identity(), sums.position_by_b_g,
+      sums.position_by_b_a, Eigen::Matrix3d::Zero(), position_by_offset;
+  return J;
+}
+
+/// Later by d, the sums from the first moment, with rate w and force f there, are those up to a later moment, without
+/// what came before: turned by -w_0 d, less f_0 d of velocity.
+std::vector<StartMoment> start_moments(const std::vector<TimeNs>& times, const StartFit::Vector& x,
+                                       const ImuBuffer& imu) {
+  const auto shifted = [&](TimeNs t_ns) { return later_by(x(StartFit::time_offset), t_ns); };
+  std::vector<StartMoment> moments(times.size());
+  StartSums sums;
+  Eigen::Vector3d rate_B, force_B;
+  std::optional<Eigen::Vector3d> first_rate_B, first_force_B;
+  for (std::size_t k = 1; k < times.size(); ++k) {
+    imu.for_each_piece(shifted(times[k - 1]), shifted(times[k]),
+                       [&](const Eigen::Vector3d& gyro_B, const Eigen::Vector3d& accel_B, double dt) {
+                         rate_B = gyro_B - x.segment<3>(StartFit::gyro_bias);
+                         force_B = accel_B - x.segment<3>(StartFit::accel_bias);
+                         if (!first_rate_B) first_rate_B = rate_B;
+                         if (!first_force_B) first_force_B = force_B;
+                         sums.add(rate_B, force_B, dt);
+                       });
+    if (!first_rate_B) break;
+    StartMoment& moment = moments[k];
+    moment.t = seconds_between(times.front(), times[k]);
+    moment.sums = sums;
+    moment.turn_by_offset = sums.R * rate_B - *first_rate_B;
+    moment.position_by_offset = sums.velocity - moment.t * *first_force_B - first_rate_B->cross(sums.position);
+  }
+  return moments;
+}
+
+PointImage image_of(const Eigen::Vector3d& point, const StartFit::Vector& x, const StartMoment& moment,
+                    const Pose& T_BC) {
+  const Eigen::Matrix3d R_BC = exp_so3(x.segment<3>(StartFit::camera_rotation)) * T_BC.R;
+  const Eigen::Matrix3d R_kB = moment.sums.R.transpose();  // to the body at this moment
+  const double inverse_depth = point.z();
+  const Eigen::Vector3d shift = T_BC.p - moment.position(x);
+  const Eigen::Vector3d direction = R_BC * point.head<2>().homogeneous();
+  const Eigen::Vector3d y = direction + inverse_depth * shift;  // in B, from the body at this moment
+  const Eigen::Vector3d h = R_BC.transpose() * (R_kB * y - inverse_depth * T_BC.p);
+  PointImage image;
+  image.depth = h.z();
+  image.uv = h.head<2>() / h.z();
+  Eigen::Matrix<double, 2, 3> by_h;
+  by_h << Eigen::Matrix2d::Identity(), -image.uv;
+  by_h /= h.z();
+  const Eigen::Matrix<double, 2, 3> by_body = by_h * R_BC.transpose();
+  image.by_point << by_body * R_kB * R_BC.leftCols<2>(), by_body * (R_kB * shift - T_BC.p);
+  image.by_position = -inverse_depth * by_body * R_kB;
+  image.by_state = image.by_position * moment.position_by_state();
+  const Eigen::Matrix<double, 2, 3> by_turn = by_body * R_kB * skew(y);
+  image.by_state.middleCols<3>(StartFit::gyro_bias) += by_turn * moment.sums.R_by_b_g;
+  image.by_state.col(StartFit::time_offset) += by_turn * moment.turn_by_offset;
+  image.by_state.middleCols<3>(StartFit::camera_rotation) +=
+      by_body * (skew(R_kB * y) - R_kB * skew(direction) - inverse_depth * skew(T_BC.p));
+  return image;
+}
+
+/// The error of turn, velocity and position, all in B, from piece to piece; with it go its covariances with the
+/// positions before.
+Eigen::MatrixXd path_noise(const std::vector<TimeNs>& times, const StartFit::Vector& x, const ImuBuffer& imu,
+                           const ImuCalibration& noise) {
+  using Matrix9 = Eigen::Matrix<double, 9, 9>;
+  const Eigen::Index size = 3 * static_cast<Eigen::Index>(times.size()) - 3;
+  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(size, size);
+  Eigen::Matrix<double, Eigen::Dynamic, 9> earlier = Eigen::Matrix<double, Eigen::Dynamic, 9>::Zero(size, 9);
+  Matrix9 P = Matrix9::Zero();
+  StartSums sums;
+  for (std::size_t k = 1; k < times.size(); ++k) {
+    imu.for_each_piece(
+        times[k - 1], times[k],
+        [&](const Eigen::Vector3d& gyro_B, const Eigen::Vector3d& accel_B, double dt, const ImuNoiseFactors& factors) {
+          const Eigen::Vector3d accel = accel_B - x.segment<3>(StartFit::accel_bias);
+          const Eigen::Matrix3d by_turn = -skew(sums.R * accel);
+          Matrix9 F = Matrix9::Identity();
+          F.block<3, 3>(3, 0) = dt * by_turn;
+          F.block<3, 3>(6, 0) = 0.5 * dt * dt * by_turn;
+          F.block<3, 3>(6, 3) = dt * Eigen::Matrix3d::Identity();
+          P = F * P * F.transpose();
+          P.diagonal().head<3>().array() += dt * std::pow(factors.gyro * noise.gyro_noise, 2);
+          P.diagonal().segment<3>(3).array() += dt * std::pow(factors.accel * noise.accel_noise, 2);
+          earlier = earlier * F.transpose();
+          sums.add(gyro_B - x.segment<3>(StartFit::gyro_bias), accel, dt);
+        });
+    const Eigen::Index at = 3 * static_cast<Eigen::Index>(k) - 3;
+    earlier.middleRows<3>(at) = P.bottomRows<3>();
+    covariance.block(0, at, at + 3, 3) = earlier.topRows(at + 3).rightCols<3>();
+    covariance.block(at, 0, 3, at + 3) = covariance.block(0, at, at + 3, 3).transpose();
+  }
+  return covariance;
+}
+
+StartAttempt single_camera_start(const std::vector<SeenFrame>& frames, const ImuBuffer& imu, const CameraState& camera,
+                                 const StartNoise& noise) {
+  std::vector<SeenFrame> used;
+  const std::size_t count = std::min(kMoments, frames.size());
+  for (std::size_t k = 0; k < count && count > 1; ++k) used.push_back(frames[k * (frames.size() - 1) / (count - 1)]);
+  if (used.size() < kFewestSightings) return {std::nullopt, Reason::few_frames};
+  return Problem(used, imu, camera, noise).solve();
+}
+
+}  // namespace ear

@@ -1,0 +1,238 @@
+#include "filter/start/single_camera_start.h"
+
+#include <doctest/doctest.h>
+
+#include <cmath>
+#include <random>
+
+#include "ear/filter_config.h"
+#include "filter/ekf/so3.h"
+#include "tools/simulator/simulation.h"
+
+using namespace ear;
+
+namespace {
+
+constexpr double kSigma = 0.6 / 385.0;  // of an observation, normalized
+
+StartSums sums(const Eigen::Vector3d& b_g, const Eigen::Vector3d& b_a) {
+  StartSums s;
+  for (int i = 0; i < 200; ++i) {
+    const double t = 0.005 * i;
+    const Eigen::Vector3d rate(0.4 * std::sin(3.0 * t), 0.7 - t, 0.5 * std::cos(2.0 * t));
+    const Eigen::Vector3d force(1.5 * std::sin(5.0 * t), t, 9.8 + std::cos(4.0 * t));
+    s.add(rate - b_g, force - b_a, 0.005);
+  }
+  return s;
+}
+
+/// A second of a swaying flight.
+StartMoment moment(const StartFit::Vector& x) {
+  ImuBuffer imu(4096);
+  for (int i = -100; i < 1300; ++i) {
+    const double t = 0.001 * i;
+    ImuSample sample;
+    sample.t_ns = 1'000'000 * i;
+    sample.gyro_B << 0.4 * std::sin(3.0 * t), 0.7 - t, 0.5 * std::cos(2.0 * t);
+    sample.accel_B << 1.5 * std::sin(5.0 * t), t, 9.8 + std::cos(4.0 * t);
+    imu.push(sample);
+  }
+  return start_moments({0, 500'000'000, 1'000'000'000}, x, imu).back();
+}
+
+/// Two seconds of a simulation, as one camera sees them.
+struct Clip {
+  std::vector<FeatureFrame> features;
+  std::vector<SeenFrame> frames;
+  ImuBuffer imu{4096};
+  CameraState camera;
+  StartNoise noise;
+
+  template <typename ChangeSample>
+  Clip(const simulator::Simulation& simulation, double from, const ChangeSample& change) {
+    const TimeNs begin_ns = simulation.imu().front().t_ns + static_cast<TimeNs>(1e9 * from);
+    const TimeNs end_ns = begin_ns + 1'500'000'000;
+    for (ImuSample sample : simulation.imu()) {
+      if (sample.t_ns < begin_ns - 20'000'000 || sample.t_ns > end_ns + 20'000'000) continue;
+      change(sample);
+      imu.push(sample);
+    }
+    const Eigen::Isometry3d& T_BC = simulation.calibration().cameras[0].T_BC;
+    camera.T_BC0 = {T_BC.linear(), T_BC.translation()};
+    noise = {PriorConfig{}, simulation.calibration().imu, kSigma};
+    std::vector<TimeNs> times;
+    for (std::size_t i = 0; i < simulation.frame_times().size(); ++i) {
+      const TimeNs t_ns = simulation.frame_times()[i];
+      if (t_ns < begin_ns || t_ns > end_ns) continue;
+      features.push_back(simulation.tracks(i));
+      times.push_back(t_ns);
+    }
+    for (std::size_t i = 0; i < times.size(); ++i) frames.push_back({times[i], &features[i]});
+  }
+
+  [[nodiscard]] StartAttempt start() const { return single_camera_start(frames, imu, camera, noise); }
+};
+
+simulator::Simulation fly(double rate_hz, std::uint64_t seed, double calibration_error) {
+  simulator::Options options;
+  options.sequence = "fly1";
+  options.seed = seed;
+  options.duration = 25.0;
+  options.camera_rate_hz = rate_hz;
+  options.calibration_error = calibration_error;
+  return simulator::Simulation(options);
+}
+
+const auto kUnchanged = [](ImuSample&) {};
+
+}  // namespace
+
+TEST_CASE("start sums: the derivatives by the biases are those of the sums") {
+  const Eigen::Vector3d zero = Eigen::Vector3d::Zero();
+  const StartSums s = sums(zero, zero);
+  constexpr double kStep = 1e-6;
+  for (int i = 0; i < 3; ++i) {
+    const Eigen::Vector3d step = kStep * Eigen::Vector3d::Unit(i);
+    const StartSums g = sums(step, zero), a = sums(zero, step);
+    CHECK((log_so3(g.R * s.R.transpose()) / kStep - s.R_by_b_g.col(i)).norm() < 1e-4);
+    CHECK(((g.velocity - s.velocity) / kStep - s.velocity_by_b_g.col(i)).norm() < 1e-3);
+    CHECK(((g.position - s.position) / kStep - s.position_by_b_g.col(i)).norm() < 1e-3);
+    CHECK(((a.velocity - s.velocity) / kStep - s.velocity_by_b_a().col(i)).norm() < 1e-6);
+    CHECK(((a.position - s.position) / kStep - s.position_by_b_a.col(i)).norm() < 1e-6);
+  }
+}
+
+TEST_CASE("single camera start: the derivatives of a point's image are those of the image") {
+  const Pose T_BC = {exp_so3(Eigen::Vector3d(0.3, -0.9, 0.4)), Eigen::Vector3d(0.1, 0.02, -0.05)};
+  StartFit::Vector x;
+  x << 0.7, -0.3, 0.2, 0.4, 0.8, -9.7, 0.02, -0.01, 0.03, 0.1, -0.05, 0.08, 0.0, 0.0, 0.0, 3e-3;
+  const Eigen::Vector3d point(0.2, -0.1, 0.25);
+  const PointImage image = image_of(point, x, moment(x), T_BC);
+  REQUIRE(image.depth > 0.1);
+  constexpr double kStep = 1e-5;
+  for (int i = 0; i < 3; ++i) {
+    const PointImage moved = image_of(point + kStep * Eigen::Vector3d::Unit(i), x, moment(x), T_BC);
+    CHECK(((moved.uv - image.uv) / kStep - image.by_point.col(i)).norm() < 1e-4);
+  }
+  for (int i = 0; i < StartFit::size; ++i) {
+    CAPTURE(i);
+    const StartFit::Vector other = x + kStep * StartFit::Vector::Unit(i);
+    const PointImage moved = image_of(point, other, moment(other), T_BC);
+    // The offset's derivative takes the rate and force of a sample, half a millisecond off.
+    const double most = i == StartFit::time_offset ? 1e-2 : 1e-3;
+    CHECK(((moved.uv - image.uv) / kStep - image.by_state.col(i)).norm() < most);
+    const Eigen::Vector3d path = moment(other).position(other) - moment(x).position(x);
+    CHECK((path / kStep - moment(x).position_by_state().col(i)).norm() < most);
+  }
+}
+
+TEST_CASE("single camera start: the noise of the path is that of many integrations") {
+  const ImuCalibration noise = [] {
+    ImuCalibration imu;
+    imu.gyro_noise = 2e-3;
+    imu.accel_noise = 2e-2;
+    return imu;
+  }();
+  const StartFit::Vector x = StartFit::Vector::Zero();
+  const std::vector<TimeNs> times{0, 400'000'000, 1'000'000'000};
+  std::mt19937_64 rng(3);
+  const auto samples = [&](double noisy) {
+    std::normal_distribution<double> normal;
+    ImuBuffer imu(4096);
+    for (int i = 0; i <= 200; ++i) {
+      ImuSample sample;
+      sample.t_ns = 5'000'000 * i;
+      sample.gyro_B << 0.0, 0.8, 0.0;
+      sample.accel_B << 1.0, 0.5, 9.81;
+      for (int k = 0; k < 3; ++k) {
+        sample.gyro_B(k) += noisy * noise.gyro_noise / std::sqrt(0.005) * normal(rng);
+        sample.accel_B(k) += noisy * noise.accel_noise / std::sqrt(0.005) * normal(rng);
+      }
+      imu.push(sample);
+    }
+    return imu;
+  };
+  const auto path = [&](const ImuBuffer& imu) {
+    const std::vector<StartMoment> moments = start_moments(times, x, imu);
+    Eigen::Matrix<double, 6, 1> p;
+    p << moments[1].position(x), moments[2].position(x);
+    return p;
+  };
+  const ImuBuffer exact = samples(0.0);
+  const Eigen::MatrixXd stated = path_noise(times, x, exact, noise);
+  Eigen::Matrix<double, 6, 6> drawn = Eigen::Matrix<double, 6, 6>::Zero();
+  constexpr int kDraws = 4000;
+  for (int i = 0; i < kDraws; ++i) {
+    const Eigen::Matrix<double, 6, 1> e = path(samples(1.0)) - path(exact);
+    drawn += e * e.transpose() / kDraws;
+  }
+  const Eigen::VectorXd sigma = stated.diagonal().cwiseSqrt();
+  const Eigen::MatrixXd scaled =
+      sigma.cwiseInverse().asDiagonal() * (drawn - stated) * sigma.cwiseInverse().asDiagonal();
+  CHECK(scaled.cwiseAbs().maxCoeff() < 0.08);
+}
+
+TEST_CASE("single camera start: velocity, tilt and bias in flight, by a calibration as wrong as real ones are") {
+  int starts = 0, windows = 0;
+  double squares = 0.0;
+  for (const double rate : {30.0, 10.0}) {
+    for (const std::uint64_t seed : {841U, 842U, 843U}) {
+      const simulator::Simulation simulation = fly(rate, seed, 1.0);
+      for (double from = 8.0; from < 22.0; from += 1.0) {
+        CAPTURE(rate);
+        CAPTURE(seed);
+        CAPTURE(from);
+        ++windows;
+        const StartAttempt attempt = Clip(simulation, from, kUnchanged).start();
+        CHECK((attempt.x || attempt.lacks != Reason::none));
+        if (!attempt.x) continue;
+        ++starts;
+        const ImuState& x = *attempt.x;
+        const simulator::Truth truth = simulation.truth(x.t_ns);
+        const Eigen::Vector3d up_B = x.R_WB.transpose() * Eigen::Vector3d::UnitZ();
+        const double tilt = std::acos(std::min(1.0, up_B.dot(truth.R_WB.transpose() * Eigen::Vector3d::UnitZ())));
+        const double v_error = (x.R_WB.transpose() * x.v_W - truth.R_WB.transpose() * truth.v_W).norm();
+        CHECK(tilt < 0.06);
+        CHECK(v_error < 0.05 + 0.15 * truth.v_W.norm());
+        CHECK((x.b_g - truth.b_g).norm() < 0.02);
+        squares += std::pow(v_error / (0.3 + truth.v_W.norm()), 2);
+      }
+    }
+  }
+  const double rms = std::sqrt(squares / starts);
+  MESSAGE(starts, " of ", windows, " windows of 1.5 s start, the velocity to ", rms);
+  CHECK(starts >= 20);
+  CHECK(rms < 0.06);
+}
+
+TEST_CASE("single camera start: no length is shown at a steady speed, and what contradicts itself starts nothing") {
+  simulator::Options options;
+  options.sequence = "flat1";
+  options.seed = 923;
+  options.duration = 12.0;
+  options.calibration_error = 0.0;
+  const simulator::Simulation steady(options);
+  int unseen = 0;
+  for (double from = 6.0; from < 10.0; from += 0.5) {
+    const StartAttempt attempt = Clip(steady, from, kUnchanged).start();
+    CHECK_FALSE(attempt.x);
+    unseen += attempt.lacks == Reason::moves_unseen ? 1 : 0;
+  }
+  CHECK(unseen >= 5);
+
+  const simulator::Simulation simulation = fly(30.0, 844, 0.0);
+  const auto lacks = [&](const auto& change) { return Clip(simulation, 10.0, change).start().lacks; };
+  REQUIRE(lacks(kUnchanged) == Reason::none);
+  CHECK(lacks([](ImuSample& sample) { sample.accel_B /= 9.81; }) != Reason::none);
+  CHECK(lacks([](ImuSample& sample) { sample.gyro_B *= 180.0 / M_PI; }) != Reason::none);
+  CHECK(lacks([](ImuSample& sample) { sample.gyro_B = -sample.gyro_B; }) != Reason::none);
+  CHECK(lacks([](ImuSample& sample) {
+          std::swap(sample.accel_B.x(), sample.accel_B.y());
+          std::swap(sample.gyro_B.x(), sample.gyro_B.y());
+        }) != Reason::none);
+  Clip blind(simulation, 10.0, kUnchanged);
+  for (FeatureFrame& frame : blind.features) frame.features.resize(5);
+  CHECK(blind.start().lacks == Reason::few_frames);
+  blind.frames.resize(2);
+  CHECK(blind.start().lacks == Reason::few_frames);
+}
