@@ -12,6 +12,8 @@ namespace {
 // three samples differs by 0.4.
 constexpr double kAlike = 0.25;
 
+constexpr double kNoiseMemory = 2.0;  // [s] chosen: as that of the images' judgement
+
 /// What a line leaves of the integral over so many intervals of a random walk that is known at both ends, `q` being the
 /// variance of a step: the variance of each of the samples that share it.
 double left_by_line(double q, double intervals, double samples) {
@@ -23,11 +25,15 @@ double left_by_line(double q, double intervals, double samples) {
 bool SpikeWatch::add(ImuBuffer& samples, double dt, bool clips) {
   const Eigen::Vector3d value = samples.entry(0).sample.*value_;
   const Eigen::Vector3d before = samples.entry(length_ + 1).sample.*value_;
-  const double step = (value - (length_ > 0 ? measured_[length_ - 1] : before)).norm();
+  const Eigen::Vector3d change = value - (length_ > 0 ? measured_[length_ - 1] : before);
+  const double step = change.norm();
   const double spread = kClear * std::sqrt(step_variance_);
   const double limit = std::max({least_, least_rate_ * dt, spread});
   const double counted = std::min(step, limit);
   step_variance_ += (1.0 - std::exp(-dt / kStreamGap)) * (counted * counted - step_variance_);
+  const Eigen::Vector3d counted_change = step > limit ? Eigen::Vector3d(change * (limit / step)) : change;
+  shared_ += (1.0 - std::exp(-dt / kNoiseMemory)) * (counted_change.dot(last_change_) - shared_);
+  last_change_ = counted_change;
 
   if (length_ > 0) {
     const double off = (measured_[length_ - 1] - before).norm();
@@ -85,6 +91,8 @@ void SpikeWatch::cross(ImuBuffer& samples, double dt, int lost) {
   const double counted = std::min(step, kClear * kClear * step_variance_);
   step_variance_ += (1.0 - std::exp(-dt / kStreamGap)) * (counted - step_variance_);
 }
+
+double SpikeWatch::white() const { return std::max(1.0, std::sqrt(std::max(0.0, -shared_) / 3.0) / sigma_); }
 
 double SpikeWatch::held() const { return std::sqrt(step_variance_) / (3.0 * sigma_); }
 

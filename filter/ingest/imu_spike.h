@@ -48,6 +48,9 @@ class SpikeWatch {
   /// Factor on the noise for each interval for which a sample's value is held: the variance of the integral of the walk
   /// over n intervals is q n^3 / 3.
   [[nodiscard]] double held() const;
+  /// Factor on the noise, 1 or more, by what two steps in a row share: the white noise of the sample between them is in
+  /// both, with opposite signs; of the body's motion there is little.
+  [[nodiscard]] double white() const;
   /// The newest sample ends no spike, and those before it were none: a strike, which leaves them as uncertain as a
   /// spike.
   void give_up(ImuBuffer& samples);
@@ -62,6 +65,8 @@ class SpikeWatch {
   double sigma_, least_, least_rate_;
   bool strikes_;
   double step_variance_;  ///< of the recent steps between samples, all axes together
+  Eigen::Vector3d last_change_ = Eigen::Vector3d::Zero();
+  double shared_ = 0.0;  ///< mean product of two steps in a row, all axes together
   std::array<Eigen::Vector3d, kLongest> measured_;
   std::size_t length_ = 0;
 };
@@ -78,6 +83,8 @@ class ImuSpikes {
   void cross(ImuBuffer& samples, double dt, int lost);
   /// Factors on the noise, per interval for which the values of a sample are held.
   [[nodiscard]] ImuNoiseFactors held() const { return {gyro_.held(), accel_.held()}; }
+  /// Factors on the noise that the samples show by themselves.
+  [[nodiscard]] ImuNoiseFactors white() const { return {gyro_.white(), accel_.white()}; }
   /// The newest came after a gap in which anything may have happened.
   void give_up(ImuBuffer& samples);
 

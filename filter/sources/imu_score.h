@@ -4,6 +4,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <optional>
 
 #include "filter/ekf/covariance.h"
@@ -22,6 +23,9 @@ class ImuScore {
 
   /// Samples of a vehicle that stands, which show the white noise; `stated`: what the calibration says of it.
   void add_rest(const ImuStatistics& rest, const ImuCalibration& stated);
+  /// Where there is no camera: what the samples show by themselves, as factors. Vibration is not white, so images know
+  /// better.
+  void set_white_noise(const ImuNoiseFactors& factors) { white_ = factors; }
   /// The motion from the state to a frame at `t_ns` by the inertial samples, and as the images show it. `P`: of the
   /// state's error. By how much the cameras turned faster than the gyroscope of late [rad/s], in the mean, about the
   /// axis where it is least likely; nothing if the images show too little.
@@ -32,7 +36,8 @@ class ImuScore {
 
  private:
   [[nodiscard]] ImuNoiseFactors learned() const {
-    return {at_rest_.gyro / gyro_.weight(), at_rest_.accel / accel_.weight()};
+    return {std::max(at_rest_.gyro / gyro_.weight(), white_.gyro),
+            std::max(at_rest_.accel / accel_.weight(), white_.accel)};
   }
 
   /// Means over the last moments, which forget in kStale.
@@ -52,6 +57,7 @@ class ImuScore {
 
   bool adapts_;
   ImuNoiseFactors at_rest_;  ///< on the stated noise, when it last stood
+  ImuNoiseFactors white_;
   Excess excess_;
   NoiseScore gyro_{kMemory, kFarthest}, accel_{kMemory, kFarthest};
 };
