@@ -14,6 +14,7 @@ namespace ear {
 namespace {
 
 constexpr std::size_t kFewestFrames = 8;  // chosen: 24 rows for 9 unknowns, whatever the frames' rate
+constexpr double kBetweenAttempts = 0.2;  // [s] chosen: with one camera
 constexpr double kScaleSigma = 0.02;   // chosen: of a path; noise of the disparities makes points too near or too far
 constexpr double kPathSigma = 1e-3;    // [m] chosen: the least of a path
 constexpr double kAccelSigma = 0.3;    // [m/s^2] chosen: what a poor accelerometer may be off between two frames
@@ -65,12 +66,19 @@ bool MovingStart::spans_enough(std::size_t first) const {
          seconds_between(frames_[first].t_ns, frames_.back().t_ns) >= kStartSpan;
 }
 
-StartAttempt MovingStart::solve(const ImuBuffer& imu, const CameraState& cameras) const {
+StartAttempt MovingStart::solve(const ImuBuffer& imu, const CameraState& cameras) {
   if (!spans_enough()) return {std::nullopt, Reason::few_frames};
   if (stereo_) return by_two_cameras(imu);
+  const TimeNs now_ns = frames_.back().t_ns;
+  if (tried_ns_ && now_ns > *tried_ns_ && seconds_between(*tried_ns_, now_ns) < kBetweenAttempts) {
+    return {std::nullopt, lacked_};
+  }
+  tried_ns_ = now_ns;
   std::vector<SeenFrame> seen;
   for (const TimedFrame& frame : frames_) seen.push_back({frame.t_ns, &frame.features});
-  return single_camera_start(seen, imu, cameras, noise_);
+  StartAttempt attempt = single_camera_start(seen, imu, cameras, noise_);
+  lacked_ = attempt.x ? Reason::slow : attempt.lacks;  // else it is not asked again
+  return attempt;
 }
 
 /// The gyroscope's bias turns what the samples add up to: linear in it where it is known roughly, from a first fit.

@@ -38,8 +38,9 @@ class MovingStart {
   /// two cameras least squares over the velocity v and gravity g of that moment, in the body as it then was (B), and
   /// the biases:
   ///   p_k+1 - p_k = v dt + g (t_k+1^2 - t_k^2) / 2 + double integral of R f          p_k: from the cameras
-  /// It is a point to linearize at, not an estimate: the frames may be used again.
-  [[nodiscard]] StartAttempt solve(const ImuBuffer& imu, const CameraState& cameras) const;
+  /// It is a point to linearize at, not an estimate: the frames may be used again. With one camera, which costs more,
+  /// by single_camera_start(), five times a second.
+  [[nodiscard]] StartAttempt solve(const ImuBuffer& imu, const CameraState& cameras);
 
   /// The path from the last frame to IMU time `t_ns`, in the body as it was then, at the speed before. Nothing before
   /// two frames.
@@ -56,6 +57,8 @@ class MovingStart {
   bool stereo_;
   std::vector<TimedFrame> frames_;  ///< oldest first
   StereoMatches matches_;
+  std::optional<TimeNs> tried_ns_;  ///< with one camera, the last time
+  Reason lacked_ = Reason::none;    ///< then
 };
 
 }  // namespace ear
