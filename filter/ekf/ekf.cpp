@@ -16,6 +16,24 @@ int error_capacity(const FilterConfig& config) { return err::clone(config.window
 /// Factor on the stated noise: what a sample has beyond it comes to the usual noise, whatever that is.
 double excess(double of_sample, double usual) { return std::sqrt(usual * usual + of_sample * of_sample - 1.0); }
 
+/// Calibration by a target shows how far away things are, the product of focal length and baseline, better than either:
+/// by as much as the mean focal length is too large, the baseline is too short.
+void correlate_baseline_and_lenses(const CameraState& cameras, const Eigen::VectorXd& sigma, Covariance& P) {
+  if (!(sigma(err::baseline) > 0.0)) return;
+  const Eigen::Vector3d shorter = -0.5 * cameras.T_C0C1.p;  // per relative error of one focal length
+  Eigen::Matrix<double, err::calibration_size, err::calibration_size> added;
+  added.setZero();
+  constexpr int baseline = err::baseline - err::camera;
+  for (int camera = 0; camera < 2; ++camera) {
+    const int focal_length = err::lens(camera) - err::camera;
+    const double variance = std::pow(sigma(err::lens(camera)), 2);
+    added.block<3, 3>(baseline, baseline) += variance * shorter * shorter.transpose();
+    added.block<3, 1>(baseline, focal_length) = variance * shorter;
+    added.block<1, 3>(focal_length, baseline) = variance * shorter.transpose();
+  }
+  P.inflate(err::camera, added);
+}
+
 }  // namespace
 
 Ekf::Ekf(const FilterConfig& config, const Calibration& calibration)
@@ -38,30 +56,12 @@ void Ekf::start(const ImuState& x, const Eigen::VectorXd& sigma, bool scale_is_g
   turned_ = 0.0;
   turned_path_.setZero();
   covariance_.reset(sigma);
-  correlate_baseline_and_lenses(sigma);
+  correlate_baseline_and_lenses(state_.camera, sigma, covariance_);
   const Eigen::RowVector2d apart(1.0 / wheel_apart_, -1.0 / wheel_apart_);
   covariance_.update(apart, err::wheel_radius, Eigen::Matrix<double, 1, 1>::Zero());
   if (!scale_is_given) return;
   const Eigen::RowVector2d mean_is_known(0.5 / kKnownSigma, 0.5 / kKnownSigma);
   covariance_.update(mean_is_known, err::wheel_radius, Eigen::Matrix<double, 1, 1>::Zero());
-}
-
-/// Calibration by a target shows how far away things are, the product of focal length and baseline, better than either:
-/// by as much as the mean focal length is too large, the baseline is too short.
-void Ekf::correlate_baseline_and_lenses(const Eigen::VectorXd& sigma) {
-  if (!(sigma(err::baseline) > 0.0)) return;
-  const Eigen::Vector3d shorter = -0.5 * state_.camera.T_C0C1.p;  // per relative error of one focal length
-  Eigen::Matrix<double, err::calibration_size, err::calibration_size> added;
-  added.setZero();
-  constexpr int baseline = err::baseline - err::camera;
-  for (int camera = 0; camera < 2; ++camera) {
-    const int focal_length = err::lens(camera) - err::camera;
-    const double variance = std::pow(sigma(err::lens(camera)), 2);
-    added.block<3, 3>(baseline, baseline) += variance * shorter * shorter.transpose();
-    added.block<3, 1>(baseline, focal_length) = variance * shorter;
-    added.block<1, 3>(focal_length, baseline) = variance * shorter.transpose();
-  }
-  covariance_.inflate(err::camera, added);
 }
 
 void Ekf::assume(const State& x, const Eigen::Ref<const Eigen::MatrixXd>& P) {

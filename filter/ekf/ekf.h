@@ -109,8 +109,6 @@ class Ekf {
   [[nodiscard]] ImuErrorMatrix ordinary_covariance(const UnseenScales& scales) const;
 
  private:
-  void correlate_baseline_and_lenses(const Eigen::VectorXd& sigma);
-
   Calibration calibration_;
   double normal_prior_;  ///< [rad]
   double wheel_apart_;   ///< of the difference of the wheel radii, relative

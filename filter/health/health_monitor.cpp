@@ -9,8 +9,7 @@ namespace {
 
 constexpr double kWorstVelocity = 1.0;   // [m/s] chosen: standard deviation of a velocity that is known,
 constexpr double kWorstDirection = 0.2;  // [rad] chosen: or of its direction, if more; a fast one may be less exact
-constexpr double kPrecise = 0.05;       // chosen: of the path: two standard deviations of the position, while tracking,
-constexpr double kPreciseEnough = 0.1;  // [m] chosen: or this, if more
+constexpr double kPreciseEnough = 0.1;   // [m] chosen: or this, if more than kPrecise of the path
 
 constexpr int kWheelQuality = 40;     // chosen: of 100; Health::quality
 constexpr int kTrackQuality = 2;      // chosen: for each feature

@@ -12,8 +12,6 @@ namespace {
 // three samples differs by 0.4.
 constexpr double kAlike = 0.25;
 
-constexpr double kNoiseMemory = 2.0;  // [s] chosen: as that of the images' judgement
-
 /// What a line leaves of the integral over so many intervals of a random walk that is known at both ends, `q` being the
 /// variance of a step: the variance of each of the samples that share it.
 double left_by_line(double q, double intervals, double samples) {

@@ -64,9 +64,9 @@ class SpikeWatch {
   Factor factor_;
   double sigma_, least_, least_rate_;
   bool strikes_;
-  double step_variance_;  ///< of the recent steps between samples, all axes together
-  Eigen::Vector3d last_change_ = Eigen::Vector3d::Zero();
-  double shared_ = 0.0;  ///< mean product of two steps in a row, all axes together
+  double step_variance_;                                   ///< of the recent steps between samples, all axes together
+  Eigen::Vector3d last_change_ = Eigen::Vector3d::Zero();  ///< the step before the newest
+  double shared_ = 0.0;                                    ///< mean product of two steps in a row, all axes together
   std::array<Eigen::Vector3d, kLongest> measured_;
   std::size_t length_ = 0;
 };
@@ -83,8 +83,8 @@ class ImuSpikes {
   void cross(ImuBuffer& samples, double dt, int lost);
   /// Factors on the noise, per interval for which the values of a sample are held.
   [[nodiscard]] ImuNoiseFactors held() const { return {gyro_.held(), accel_.held()}; }
-  /// Factors on the noise that the samples show by themselves.
-  [[nodiscard]] ImuNoiseFactors white() const { return {gyro_.white(), accel_.white()}; }
+  /// Factor on the accelerometer's noise, 1 or more, as its samples show it.
+  [[nodiscard]] double white_accel() const { return accel_.white(); }
   /// The newest came after a gap in which anything may have happened.
   void give_up(ImuBuffer& samples);
 

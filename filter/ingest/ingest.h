@@ -77,8 +77,8 @@ class Ingest {
   [[nodiscard]] WheelIncrements increments() const { return {passed_increment_, increments_}; }
   [[nodiscard]] const Ring<WheelIncrement>& waiting_increments() const { return increments_; }
   [[nodiscard]] const ImuBuffer& imu() const { return imu_; }
-  /// Factors on the white noise of the inertial samples, 1 or more, as they show it by themselves.
-  [[nodiscard]] ImuNoiseFactors white_noise() const { return spikes_.white(); }
+  /// Factor on the accelerometer's white noise, 1 or more, as its samples show it.
+  [[nodiscard]] double white_accel() const { return spikes_.white_accel(); }
   [[nodiscard]] ImuInterruption& interruption() { return interruption_; }
   [[nodiscard]] InputCounts counts() const;
 

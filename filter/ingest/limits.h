@@ -31,6 +31,10 @@ inline constexpr double kFastest = 100.0;  ///< [m/s] chosen: no vehicle with wh
 
 /// [s] chosen: of what a regression is made of, of an interval, which a crystal keeps, and of how late stamps are.
 inline constexpr double kSlopeMemory = 100.0;
+/// Chosen: share of the path to which a position is known: two standard deviations while tracking, one at a start.
+inline constexpr double kPrecise = 0.05;
+/// [s] chosen: of the noise of inertial samples: a single image that is wrong changes little.
+inline constexpr double kNoiseMemory = 2.0;
 inline constexpr double kClear = 4.0;  ///< chosen: so many standard deviations are not chance
 inline constexpr int kToKnow = 20;     ///< chosen: a mean of so many is known, whatever their rate
 /// Chosen: so many samples in a row confirm each other; one may have a false stamp.

@@ -12,6 +12,7 @@
 #include "filter/ekf/noise_score.h"
 #include "filter/ekf/records.h"
 #include "filter/ingest/imu_buffer.h"
+#include "filter/ingest/limits.h"
 #include "filter/sources/cameras/stereo_motion.h"
 
 namespace ear {
@@ -23,9 +24,10 @@ class ImuScore {
 
   /// Samples of a vehicle that stands, which show the white noise; `stated`: what the calibration says of it.
   void add_rest(const ImuStatistics& rest, const ImuCalibration& stated);
-  /// Where there is no camera: what the samples show by themselves, as factors. Vibration is not white, so images know
-  /// better.
-  void set_white_noise(const ImuNoiseFactors& factors) { white_ = factors; }
+  /// Where there is no camera: what the accelerometer's samples show by themselves, as a factor. Vibration is not
+  /// white, so images know better. Not the gyroscope's: wheels would turn the vehicle instead, whose track width is a
+  /// guess.
+  void set_white_accel(double factor) { white_accel_ = factor; }
   /// The motion from the state to a frame at `t_ns` by the inertial samples, and as the images show it. `P`: of the
   /// state's error. By how much the cameras turned faster than the gyroscope of late [rad/s], in the mean, about the
   /// axis where it is least likely; nothing if the images show too little.
@@ -36,8 +38,7 @@ class ImuScore {
 
  private:
   [[nodiscard]] ImuNoiseFactors learned() const {
-    return {std::max(at_rest_.gyro / gyro_.weight(), white_.gyro),
-            std::max(at_rest_.accel / accel_.weight(), white_.accel)};
+    return {at_rest_.gyro / gyro_.weight(), std::max(at_rest_.accel / accel_.weight(), white_accel_)};
   }
 
   /// Means over the last moments, which forget in kStale.
@@ -52,14 +53,13 @@ class ImuScore {
   std::optional<Innovation> add_excess(const ExcessTurn& turn, const ImuMotion& motion, const Covariance& P,
                                        TimeNs t_ns);
 
-  static constexpr double kMemory = 2.0;      // [s] chosen: a single image that is wrong changes little,
   static constexpr double kFarthest = 100.0;  // chosen: counting as ten times the usual noise at most
 
   bool adapts_;
   ImuNoiseFactors at_rest_;  ///< on the stated noise, when it last stood
-  ImuNoiseFactors white_;
+  double white_accel_ = 1.0;
   Excess excess_;
-  NoiseScore gyro_{kMemory, kFarthest}, accel_{kMemory, kFarthest};
+  NoiseScore gyro_{kNoiseMemory, kFarthest}, accel_{kNoiseMemory, kFarthest};
 };
 
 }  // namespace ear

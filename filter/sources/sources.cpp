@@ -67,7 +67,7 @@ void Sources::score_imu(const FeatureFrame& frame, const Consistency& consistenc
 }
 
 void Sources::advance(TimeNs t_ns, const Advice& advice, Ingest& ingest, Ekf& ekf, Records& records) {
-  if (cameras_.count() == 0) imu_score_.set_white_noise(ingest.white_noise());
+  if (cameras_.count() == 0) imu_score_.set_white_accel(ingest.white_accel());
   while (const std::optional<Measurement> z = ingest.next(t_ns)) {
     propagate(z->t_ns, advice, ingest, ekf);
     const bool bridge_ahead =

@@ -14,11 +14,7 @@ namespace ear {
 namespace {
 
 constexpr std::size_t kFewestFrames = 8;  // chosen: 24 rows for 9 unknowns, whatever the frames' rate
-constexpr double kBetweenAttempts = 0.2;  // [s] chosen: with one camera
-constexpr double kScaleSigma = 0.02;   // chosen: of a path; noise of the disparities makes points too near or too far
-constexpr double kPathSigma = 1e-3;    // [m] chosen: the least of a path
-constexpr double kAccelSigma = 0.3;    // [m/s^2] chosen: what a poor accelerometer may be off between two frames
-constexpr double kWorstGravity = 0.7;  // [m/s^2] chosen: by which the cameras alone may miss it
+constexpr double kAccelSigma = 0.3;       // [m/s^2] chosen: what a poor accelerometer may be off between two frames
 
 /// The same image twice: no two exposures are exactly equal, and nothing shows how the vehicle moves.
 bool frozen(const std::vector<StereoMatch>& matches) {
@@ -70,7 +66,7 @@ StartAttempt MovingStart::solve(const ImuBuffer& imu, const CameraState& cameras
   if (!spans_enough()) return {std::nullopt, Reason::few_frames};
   if (stereo_) return by_two_cameras(imu);
   const TimeNs now_ns = frames_.back().t_ns;
-  if (tried_ns_ && now_ns > *tried_ns_ && seconds_between(*tried_ns_, now_ns) < kBetweenAttempts) {
+  if (tried_ns_ && now_ns > *tried_ns_ && seconds_between(*tried_ns_, now_ns) < kStartSpan / kFewestFrames) {
     return {std::nullopt, lacked_};
   }
   tried_ns_ = now_ns;
@@ -85,11 +81,8 @@ StartAttempt MovingStart::solve(const ImuBuffer& imu, const CameraState& cameras
 StartAttempt MovingStart::by_two_cameras(const ImuBuffer& imu) const {
   const StartFit rough = fit_to_motions(Eigen::Vector3d::Zero(), imu);
   const StartFit fit = fit_to_motions(rough.solution().segment<3>(StartFit::gyro_bias), imu);
-  // Gravity as the cameras alone see it must have about its known size.
-  if (!(std::abs(fit.free_gravity() + kGravity_W.z()) < kWorstGravity))
-    return {std::nullopt, Reason::cameras_contradict};
   const std::optional<StartFit::Vector> x = fit.solve();
-  if (!x) return {std::nullopt, Reason::cameras_contradict};
+  if (!x || !fit.expected(*x, kClear)) return {std::nullopt, Reason::cameras_contradict};
   return {start_state(frames_.front().t_ns, *x), Reason::none};
 }
 
@@ -113,10 +106,8 @@ StartFit MovingStart::fit_to_motions(const Eigen::Vector3d& b_g, const ImuBuffer
     H.middleCols<3>(StartFit::gyro_bias) = skew(path) * before.R_by_b_g + sums.position_by_b_g - before.position_by_b_g;
     H.middleCols<3>(StartFit::accel_bias) = sums.position_by_b_a - before.position_by_b_a;
     const Eigen::Vector3d z = path - (sums.position - before.position) + H.middleCols<3>(StartFit::gyro_bias) * b_g;
-    const double scale = kScaleSigma * path.norm();
     const double unsteady = kAccelSigma * (t1 - t0) * (t1 - t0);
-    const double variance =
-        motion.p_covariance().trace() / 3.0 + kPathSigma * kPathSigma + scale * scale + unsteady * unsteady;
+    const double variance = motion.p_covariance().trace() / 3.0 + unsteady * unsteady;
     fit.add(H, z, variance);
 
     const Eigen::Matrix3d R = before.R.transpose() * sums.R;

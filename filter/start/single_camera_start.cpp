@@ -8,20 +8,16 @@
 #include <map>
 
 #include "filter/ekf/so3.h"
+#include "filter/ingest/limits.h"
+#include "filter/sources/cameras/stereo_motion.h"
 #include "filter/sources/cameras/triangulation.h"
 
 namespace ear {
 namespace {
 
-constexpr std::size_t kMoments = 12;         // chosen: frames that are used, evenly spaced
-constexpr std::size_t kFewestSightings = 4;  // chosen: of a point
-constexpr std::size_t kFewestPoints = 15;    // chosen
-constexpr int kIterations = 20;              // chosen
-constexpr double kHuber = 2.0;               // [standard deviations] chosen
-constexpr double kOutlier = 5.0;             // [standard deviations] chosen: no noise
-constexpr double kSettled = 1e-3;            // [m/s] chosen
-constexpr double kWorstVariance = 2.0;       // chosen: of the observations, times the usual one
-constexpr double kWorstScale = 0.05;         // chosen: standard deviation of the path's length, as a share
+constexpr std::size_t kMoments = 12;  // chosen: frames that are used, evenly spaced
+constexpr int kIterations = 20;       // chosen
+constexpr double kSettled = 1e-3;     // [m/s] chosen
 
 struct Sight {
   std::size_t moment;
@@ -43,7 +39,7 @@ std::vector<Point> points_of(const std::vector<SeenFrame>& frames, const LensErr
   }
   std::vector<Point> points;
   for (auto& [id, point] : by_id) {
-    if (point.sights.size() >= kFewestSightings) points.push_back(std::move(point));
+    if (point.sights.size() > kConfirmed) points.push_back(std::move(point));
   }
   return points;
 }
@@ -94,7 +90,7 @@ class Problem {
   }
 
   [[nodiscard]] StartAttempt solve() {
-    if (points_.size() < kFewestPoints) return {std::nullopt, Reason::few_frames};
+    if (points_.size() < kToKnow) return {std::nullopt, Reason::few_frames};
     find_gyro_bias();
     guess();
     errors_information_ = path_noise(times_, x_, imu_, noise_.imu).inverse();
@@ -274,16 +270,16 @@ bool Problem::fits() const {
       const PointImage image = image_of(point.value, x_, moments_[sight.moment], T_BC_);
       const double r = image.depth > kLeastDepth ? (sight.uv - image.uv).norm() / noise_.feature_sigma : HUGE_VAL;
       worst = std::max(worst, r);
-      squares += std::pow(std::min(r, kOutlier), 2);
+      squares += std::pow(std::min(r, kClear), 2);
       rows += 2.0;
     }
-    fitting += worst < kOutlier ? 1 : 0;
+    fitting += worst < kClear ? 1 : 0;
   }
   const double path_squares = errors_.dot(errors_information_ * errors_);
-  if (!fit_.expected(x_, kOutlier) || path_squares > kOutlier * kOutlier * static_cast<double>(errors_.size())) {
+  if (!fit_.expected(x_, kClear) || path_squares > kClear * kClear * static_cast<double>(errors_.size())) {
     return false;
   }
-  return squares <= kWorstVariance * rows && fitting >= std::max(kFewestPoints, points_.size() / 2);
+  return squares <= kWorstFit * rows && fitting >= std::max<std::size_t>(kToKnow, points_.size() / 2);
 }
 
 /// At the farthest of its positions.
@@ -294,7 +290,7 @@ bool Problem::shows_length() const {
   const StartMoment& farthest = *std::max_element(moments_.begin(), moments_.end(), before);
   const Eigen::Vector3d p = farthest.position(x_);
   const StartFit::Vector J = farthest.position_by_state().transpose() * p.normalized();
-  return J.dot(fit_.information(x_).ldlt().solve(J)) < std::pow(kWorstScale * p.norm(), 2);
+  return J.dot(fit_.information(x_).ldlt().solve(J)) < std::pow(kPrecise * p.norm(), 2);
 }
 
 }  // namespace
@@ -404,7 +400,7 @@ StartAttempt single_camera_start(const std::vector<SeenFrame>& frames, const Imu
   std::vector<SeenFrame> used;
   const std::size_t count = std::min(kMoments, frames.size());
   for (std::size_t k = 0; k < count && count > 1; ++k) used.push_back(frames[k * (frames.size() - 1) / (count - 1)]);
-  if (used.size() < kFewestSightings) return {std::nullopt, Reason::few_frames};
+  if (used.size() <= kConfirmed) return {std::nullopt, Reason::few_frames};
   return Problem(used, imu, camera, noise).solve();
 }
 

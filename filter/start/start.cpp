@@ -179,9 +179,8 @@ std::optional<StartState> Start::standing(TimeNs t_ns, const ImuStatistics& imu)
 
 /// The samples of the fit are used again: it only says where the filter is to be linear, so the velocity is as good as
 /// unknown. With one camera the filter would then learn the length of the path from its own errors of linearisation:
-/// the fit says roughly what it is. dv_B = R^T nu, dg_B = R^T [g]x theta.
+/// the fit says what it is, with kWorstFit times its standard deviations. dv_B = R^T nu, dg_B = R^T [g]x theta.
 StartState Start::in_motion(const StartAttempt& attempt) const {
-  constexpr double kRoughly = 2.0;  // chosen: times the standard deviations of the fit
   StartState start;
   start.x = *attempt.x;
   start.sigma = sigma();
@@ -194,7 +193,7 @@ StartState Start::in_motion(const StartAttempt& attempt) const {
   J.block<3, 3>(StartFit::gravity, err::theta) = R_BW * skew(kGravity_W);
   J.block<3, 3>(StartFit::gyro_bias, err::b_g).setIdentity();
   J.block<3, 3>(StartFit::accel_bias, err::b_a).setIdentity();
-  start.H = attempt.information->llt().matrixU() * J / kRoughly;
+  start.H = attempt.information->llt().matrixU() * J / kWorstFit;
   start.residual.setZero(StartFit::motion_size);
   return start;
 }

@@ -20,11 +20,6 @@ StartFit::StartFit(const PriorConfig& prior, const Vector& x) {
   b_ = -prior_information_.cwiseProduct(x);
 }
 
-double StartFit::free_gravity() const {
-  const Vector x = A_.ldlt().solve(b_);
-  return x.segment<3>(gravity).norm();
-}
-
 StartFit::Matrix StartFit::information(const Vector& x) const {
   const Eigen::Vector3d along = x.segment<3>(gravity).normalized() / kSizeSigma;
   Matrix A = A_;

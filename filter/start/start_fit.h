@@ -12,7 +12,8 @@
 
 namespace ear {
 
-/// Chosen: root mean square residual of a start that fits, in standard deviations.
+/// Chosen: root mean square residual of a start that fits, in standard deviations of noise that is guessed; their mean
+/// square, in variances of noise that is known.
 inline constexpr double kWorstFit = 2.0;
 
 /// Unknowns: velocity [m/s], gravity [m/s^2], biases of gyroscope [rad/s] and accelerometer [m/s^2], in the body of the
@@ -42,8 +43,6 @@ class StartFit {
     b_ += b;
   }
 
-  /// The size of gravity as the rows alone show it [m/s^2].
-  [[nodiscard]] double free_gravity() const;
   /// Nothing if the rows do not fit; they were linear.
   [[nodiscard]] std::optional<Vector> solve() const;
   /// The same whether they fit or not.

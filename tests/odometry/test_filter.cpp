@@ -74,11 +74,13 @@ TEST_CASE("filter: starts within a second of standing, level and at the origin")
   CHECK(run.front().dtheta_W.norm() < 0.02);  // an accelerometer bias of 0.1 m/s^2 tilts by 0.01 rad
 }
 
-TEST_CASE("filter: without wheels, a vehicle that moves gets a pose from two cameras, from one it gets none") {
+TEST_CASE("filter: without wheels, a vehicle that moves gets a pose from two cameras, and later from one") {
   const simulator::Simulation simulation = simulate("flat1", 9.0);
   CHECK(estimates_when_started_at(simulation, 0.0, 9.0, 1) > 200);
-  CHECK(estimates_when_started_at(simulation, 5.0, 9.0, 1) == 0);
-  CHECK(estimates_when_started_at(simulation, 5.0, 9.0, 2) > 60);
+  const std::size_t of_one = estimates_when_started_at(simulation, 5.0, 9.0, 1);
+  const std::size_t of_two = estimates_when_started_at(simulation, 5.0, 9.0, 2);
+  CHECK(of_two > 60);
+  CHECK(of_one < of_two);
 }
 
 TEST_CASE("filter: standing for a minute it stays where it is") {

@@ -16,7 +16,6 @@ namespace ear {
 namespace {
 
 constexpr int kIterations = 12;  // chosen
-constexpr double kHuber = 2.0;   // [standard deviations] chosen: from where an observation weighs less
 
 /// Sums of one Gauss-Newton step over (rotation, translation).
 struct NormalEquations {

@@ -40,6 +40,8 @@ class StereoMatches {
 [[nodiscard]] double stereo_inverse_depth(const CameraState& cameras, const Eigen::Vector2d& left,
                                           const Eigen::Vector2d& right);
 
+/// [standard deviations] chosen: from where an observation weighs less.
+inline constexpr double kHuber = 2.0;
 /// [rad] chosen: standard deviation of a turn between two images, whatever the fit's covariance is.
 inline constexpr double kSeenTurn = 2e-3;
 
