@@ -7,6 +7,7 @@
 #include <cmath>
 #include <map>
 
+#include "filter/ekf/initial_state.h"
 #include "filter/ekf/so3.h"
 #include "filter/ingest/limits.h"
 #include "filter/sources/cameras/stereo_motion.h"
@@ -17,7 +18,6 @@ namespace {
 
 constexpr std::size_t kMoments = 12;  // chosen: frames that are used, evenly spaced
 constexpr int kIterations = 20;       // chosen
-constexpr double kSettled = 1e-3;     // [m/s] chosen
 
 struct Sight {
   std::size_t moment;
@@ -95,8 +95,8 @@ class Problem {
     guess();
     errors_information_ = path_noise(times_, x_, imu_, noise_.imu).inverse();
     double step = HUGE_VAL;
-    for (int i = 0; i < kIterations && step > kSettled; ++i) step = iterate();
-    const bool settled = step <= kSettled;
+    for (int i = 0; i < kIterations && step > kPrecise; ++i) step = iterate();
+    const bool settled = step <= kPrecise;
     if (settled && !fits()) return {std::nullopt, Reason::cameras_contradict};
     if (!settled || !shows_length()) return {std::nullopt, Reason::moves_unseen};
     return {start_state(times_.front(), x_), Reason::none, fit_.motion_information(x_)};
@@ -143,7 +143,7 @@ void Problem::find_gyro_bias() {
     for (std::size_t k = 1; k < moments_.size(); ++k) add_turn(k, A, b);
     const Eigen::Vector3d step = A.ldlt().solve(b);
     b_g += step;
-    if (step.norm() < kSettled * noise_.prior.gyro_bias) break;
+    if (step.norm() < kKnownSigma) break;
   }
 }
 
@@ -209,7 +209,7 @@ void Problem::guess() {
   }
 }
 
-/// Returns the step of the velocity [m/s].
+/// Returns the step of the velocity, in its standard deviations.
 double Problem::iterate() {
   integrate();
   constexpr Eigen::Index n = StartFit::size;
@@ -256,7 +256,8 @@ double Problem::iterate() {
   x_ += step.head<n>();
   errors_ += step.tail(m);
   for (std::size_t i = 0; i < points_.size(); ++i) points_[i].value += sums_[i].step(step);
-  return step.segment<3>(StartFit::velocity).norm();
+  const double variance = fit_.information(x_).inverse().topLeftCorner<3, 3>().trace();
+  return step.segment<3>(StartFit::velocity).norm() / std::sqrt(variance);
 }
 
 /// The images, and what was known before.
