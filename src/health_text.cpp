@@ -32,7 +32,8 @@ const char* to_text(Reason reason) {
     case Reason::other_gravity:
       return "it stands, but the mean specific force is not gravity: another unit, or a broken accelerometer";
     case Reason::moves_unseen:
-      return "it moves, and nothing shows how far: no wheels on the ground, no two cameras, no change of speed with one";
+      return "it moves, and nothing shows how far: no wheels on the ground, no two cameras, no change of speed with "
+             "one";
     case Reason::few_readings:
       return "it rolls, and the readings of the wheels do not span 1.5 s yet";
     case Reason::wheel_gaps:
