@@ -121,7 +121,7 @@ MapAlignment Start::begin(const StartState& start, const std::optional<Estimate>
       sources.update(&frame.features, false, advice, ekf, records);
     }
     records.statistics = statistics;
-    if (!last_good) ekf.move_origin();
+    if (!last_good && start.residual.size() > 0) ekf.move_origin();  // with one camera
   }
   forget_frames();
   return alignment;
