@@ -13,7 +13,7 @@
 namespace ear {
 namespace {
 
-constexpr std::size_t kFewestFrames = 8;  // chosen: 24 rows for 9 unknowns, whatever the frames' rate
+constexpr std::size_t kFewestFrames = 8;  // chosen: 42 rows for 12 unknowns, whatever the frames' rate
 constexpr double kScaleSigma = 0.02;  // chosen: of a path; noise of the disparities makes points too near or too far
 constexpr double kAccelSigma = 0.3;   // [m/s^2] chosen: what a poor accelerometer may be off between two frames
 

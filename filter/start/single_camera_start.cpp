@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <utility>
 
 #include "filter/ekf/initial_state.h"
 #include "filter/ekf/so3.h"
@@ -43,6 +44,9 @@ std::vector<Point> points_of(const std::vector<SeenFrame>& frames, const LensErr
   }
   return points;
 }
+
+/// Of a residual with this standard deviation, by Huber.
+double weight_of(double residual, double sigma) { return std::min(1.0, kHuber * sigma / residual) / (sigma * sigma); }
 
 /// Normal equations of one point, and of it with the other unknowns.
 struct PointSums {
@@ -110,7 +114,6 @@ class Problem {
   [[nodiscard]] bool fits() const;
   [[nodiscard]] bool shows_length() const;
   void integrate();
-  [[nodiscard]] Eigen::Matrix3d R_BC() const { return exp_so3(x_.segment<3>(StartFit::camera_rotation)) * T_BC_.R; }
 
   const ImuBuffer& imu_;
   Pose T_BC_;
@@ -147,10 +150,11 @@ void Problem::find_gyro_bias() {
   }
 }
 
-/// Frames k - 1 and k. The way is the direction most nearly perpendicular to all normals.
+/// Frames k - 1 and k; the camera is as calibrated yet. The way is the direction most nearly perpendicular to all
+/// normals.
 void Problem::add_turn(std::size_t k, Eigen::Matrix3d& A, Eigen::Vector3d& b) const {
   const auto ray = [&](const Sight& sight) {
-    return Eigen::Vector3d(moments_[sight.moment].sums.R * (R_BC() * sight.uv.homogeneous().normalized()));
+    return Eigen::Vector3d(moments_[sight.moment].sums.R * (T_BC_.R * sight.uv.homogeneous().normalized()));
   };
   std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> rays;
   Eigen::Matrix3d normals = Eigen::Matrix3d::Zero();
@@ -168,7 +172,7 @@ void Problem::add_turn(std::size_t k, Eigen::Matrix3d& A, Eigen::Vector3d& b) co
   for (const auto& [from, to] : rays) {
     const double r = way.dot(from.cross(to));
     const Eigen::RowVector3d J = -way.transpose() * skew(from) * skew(to) * turn;
-    const double weight = std::min(1.0, kHuber * sigma / std::abs(r)) / (sigma * sigma);
+    const double weight = weight_of(std::abs(r), sigma);
     A += weight * J.transpose() * J;
     b -= weight * r * J.transpose();
   }
@@ -223,8 +227,7 @@ double Problem::iterate() {
       point.in_front = point.in_front && image.depth > kLeastDepth;
       if (!point.in_front) break;
       const Eigen::Vector2d r = sight.uv - image.uv;
-      const double weight =
-          std::min(1.0, kHuber * noise_.feature_sigma / r.norm()) / (noise_.feature_sigma * noise_.feature_sigma);
+      const double weight = weight_of(r.norm(), noise_.feature_sigma);
       const Eigen::Matrix<double, StartFit::size, 2> by_state = weight * image.by_state.transpose();
       const Eigen::Matrix<double, 3, 2> by_position = weight * image.by_position.transpose();
       sums.A += weight * image.by_point.transpose() * image.by_point;
@@ -315,22 +318,21 @@ std::vector<StartMoment> start_moments(const std::vector<TimeNs>& times, const S
   std::vector<StartMoment> moments(times.size());
   StartSums sums;
   Eigen::Vector3d rate_B, force_B;
-  std::optional<Eigen::Vector3d> first_rate_B, first_force_B;
+  std::optional<std::pair<Eigen::Vector3d, Eigen::Vector3d>> first;  // rate and force
   for (std::size_t k = 1; k < times.size(); ++k) {
     imu.for_each_piece(shifted(times[k - 1]), shifted(times[k]),
                        [&](const Eigen::Vector3d& gyro_B, const Eigen::Vector3d& accel_B, double dt) {
                          rate_B = gyro_B - x.segment<3>(StartFit::gyro_bias);
                          force_B = accel_B - x.segment<3>(StartFit::accel_bias);
-                         if (!first_rate_B) first_rate_B = rate_B;
-                         if (!first_force_B) first_force_B = force_B;
+                         if (!first) first = {rate_B, force_B};
                          sums.add(rate_B, force_B, dt);
                        });
-    if (!first_rate_B) break;
+    if (!first) break;
     StartMoment& moment = moments[k];
     moment.t = seconds_between(times.front(), times[k]);
     moment.sums = sums;
-    moment.turn_by_offset = sums.R * rate_B - *first_rate_B;
-    moment.position_by_offset = sums.velocity - moment.t * *first_force_B - first_rate_B->cross(sums.position);
+    moment.turn_by_offset = sums.R * rate_B - first->first;
+    moment.position_by_offset = sums.velocity - moment.t * first->second - first->first.cross(sums.position);
   }
   return moments;
 }

@@ -21,9 +21,8 @@ namespace ear {
 struct StartState {
   ImuState x;
   Eigen::VectorXd sigma;  ///< standard deviations of the whole error vector
-  /// What the mean samples show of attitude and biases of a vehicle that stands, or what was given of the velocity,
-  /// whitened: residual = H e + n, by the inertial part. Roughly what a start in motion with one camera
-  /// is.
+  /// Whitened, residual = H e + n, by the inertial part: what the mean samples show of attitude and biases of a vehicle
+  /// that stands, what was given of the velocity, or what the fit of one camera in motion knows. Else no rows.
   Eigen::Matrix<double, Eigen::Dynamic, err::imu_size> H;
   Eigen::VectorXd residual;
   bool from_frames = false;  ///< in motion, at the first of the frames kept: all of them are to be taken in

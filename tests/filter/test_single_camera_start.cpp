@@ -15,17 +15,6 @@ namespace {
 
 constexpr double kSigma = 0.6 / 385.0;  // of an observation, normalized
 
-StartSums sums(const Eigen::Vector3d& b_g, const Eigen::Vector3d& b_a) {
-  StartSums s;
-  for (int i = 0; i < 200; ++i) {
-    const double t = 0.005 * i;
-    const Eigen::Vector3d rate(0.4 * std::sin(3.0 * t), 0.7 - t, 0.5 * std::cos(2.0 * t));
-    const Eigen::Vector3d force(1.5 * std::sin(5.0 * t), t, 9.8 + std::cos(4.0 * t));
-    s.add(rate - b_g, force - b_a, 0.005);
-  }
-  return s;
-}
-
 /// A second of a swaying flight.
 StartMoment moment(const StartFit::Vector& x) {
   ImuBuffer imu(4096);
@@ -40,7 +29,14 @@ StartMoment moment(const StartFit::Vector& x) {
   return start_moments({0, 500'000'000, 1'000'000'000}, x, imu).back();
 }
 
-/// Two seconds of a simulation, as one camera sees them.
+StartSums sums(const Eigen::Vector3d& b_g, const Eigen::Vector3d& b_a) {
+  StartFit::Vector x = StartFit::Vector::Zero();
+  x.segment<3>(StartFit::gyro_bias) = b_g;
+  x.segment<3>(StartFit::accel_bias) = b_a;
+  return moment(x).sums;
+}
+
+/// One and a half seconds of a simulation, as one camera sees them.
 struct Clip {
   std::vector<FeatureFrame> features;
   std::vector<SeenFrame> frames;

@@ -314,7 +314,6 @@ TEST_CASE("start: one camera in flight, with a calibration as wrong as real ones
 TEST_CASE("start: why there is none, in words") {
   const simulator::Simulation simulation = simulate("flat1", 923, 12.0);
   Vehicle vehicle;
-  vehicle.from = 6.5;
   vehicle.cameras = 1;
   vehicle.wheels = false;
   const simulator::Simulation brief = simulate("flat1", 923, 10.0);
@@ -326,7 +325,6 @@ TEST_CASE("start: why there is none, in words") {
   vehicle.wheels = true;
   vehicle.encoder_every = 30;  // 3.3 Hz: with counts that wrap nobody knows how far the wheels turned
   CHECK(run(brief, vehicle).reason == Reason::wheel_gaps);
-  vehicle.from = 6.5;
   vehicle.encoder_every = 1;
   vehicle.from = 11.0;
   CHECK(run(simulation, vehicle).reason == Reason::few_readings);
