@@ -393,7 +393,7 @@ Eigen::MatrixXd path_noise(const std::vector<TimeNs>& times, const StartFit::Vec
     const Eigen::Index at = 3 * static_cast<Eigen::Index>(k) - 3;
     earlier.middleRows<3>(at) = P.bottomRows<3>();
     covariance.block(0, at, at + 3, 3) = earlier.topRows(at + 3).rightCols<3>();
-    covariance.block(at, 0, 3, at + 3) = covariance.block(0, at, at + 3, 3).transpose();
+    covariance.block(at, 0, 3, at + 3) = earlier.topRows(at + 3).rightCols<3>().transpose();
   }
   return covariance;
 }
