@@ -19,11 +19,16 @@ namespace ear {
 
 class ImuScore {
  public:
+  /// Chosen: of an innovation's square over the usual variance: ten times the usual noise at most.
+  static constexpr double kFarthest = 100.0;
+
   /// `adapts`: false for the noise that the calibration states.
   explicit ImuScore(bool adapts) : adapts_(adapts) {}
 
   /// Samples of a vehicle that stands, which show the white noise; `stated`: what the calibration says of it.
   void add_rest(const ImuStatistics& rest, const ImuCalibration& stated);
+  /// The factors that a start in motion has measured.
+  void set_start(const ImuNoiseFactors& factors) { at_rest_ = factors; }
   /// Where there is no camera: what the accelerometer's samples show by themselves, as a factor. Vibration is not
   /// white, so images know better. Not the gyroscope's: wheels would turn the vehicle instead, whose track width is a
   /// guess.
@@ -53,10 +58,8 @@ class ImuScore {
   std::optional<Innovation> add_excess(const ExcessTurn& turn, const ImuMotion& motion, const Covariance& P,
                                        TimeNs t_ns);
 
-  static constexpr double kFarthest = 100.0;  // chosen: counting as ten times the usual noise at most
-
   bool adapts_;
-  ImuNoiseFactors at_rest_;  ///< on the stated noise, when it last stood
+  ImuNoiseFactors at_rest_;  ///< on the stated noise, when it last stood or started
   double white_accel_ = 1.0;
   Excess excess_;
   NoiseScore gyro_{kNoiseMemory, kFarthest}, accel_{kNoiseMemory, kFarthest};

@@ -60,6 +60,7 @@ class Sources {
   [[nodiscard]] Cameras& cameras() { return cameras_; }
   [[nodiscard]] const Cameras& cameras() const { return cameras_; }
   [[nodiscard]] Standstill& standstill() { return standstill_; }
+  [[nodiscard]] ImuScore& imu_score() { return imu_score_; }
 
  private:
   static void inflate_after_takeoff(Ekf& ekf);

@@ -4,6 +4,7 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <utility>
@@ -13,6 +14,7 @@
 #include "filter/ingest/limits.h"
 #include "filter/sources/cameras/stereo_motion.h"
 #include "filter/sources/cameras/triangulation.h"
+#include "filter/sources/imu_score.h"
 
 namespace ear {
 namespace {
@@ -29,6 +31,9 @@ struct Point {
   Eigen::Vector3d value = Eigen::Vector3d::Zero();  // as image_of() takes it
   bool in_front = true;
 };
+
+/// How many errors of the path there are at the moments before this one; the first has none.
+Eigen::Index errors_before(std::size_t moment) { return StartMoment::errors * static_cast<Eigen::Index>(moment - 1); }
 
 /// The points that enough of the frames see.
 std::vector<Point> points_of(const std::vector<SeenFrame>& frames, const LensError& lens) {
@@ -64,7 +69,7 @@ struct PointSums {
   }
 };
 
-/// Normal equations of the unknowns that the points share: the state, then the errors of the positions.
+/// Normal equations of the unknowns that the points share: the state, then the errors of the path.
 struct SharedSums {
   Eigen::MatrixXd A;
   Eigen::VectorXd b;
@@ -88,7 +93,7 @@ class Problem {
         noise_(noise),
         points_(points_of(frames, camera.lens_error[0])),
         sums_(points_.size()),
-        errors_(Eigen::VectorXd::Zero(3 * static_cast<Eigen::Index>(frames.size()) - 3)),
+        errors_(Eigen::VectorXd::Zero(errors_before(frames.size()))),
         fit_(noise.prior) {
     for (const SeenFrame& frame : frames) times_.push_back(frame.t_ns);
   }
@@ -97,13 +102,18 @@ class Problem {
     if (points_.size() < kToKnow) return {std::nullopt, Reason::few_frames};
     find_gyro_bias();
     guess();
-    errors_information_ = path_noise(times_, x_, imu_, noise_.imu).inverse();
+    for (std::size_t i = 0; i < 2; ++i) {
+      ImuCalibration one = noise_.imu;
+      (i == 0 ? one.accel_noise : one.gyro_noise) = 0.0;
+      stated_[i] = path_noise(times_, x_, imu_, one);
+    }
     double step = HUGE_VAL;
     for (int i = 0; i < kIterations && step > kPrecise; ++i) step = iterate();
     const bool settled = step <= kPrecise;
     if (settled && !fits()) return {std::nullopt, Reason::cameras_contradict};
     if (!settled || !shows_length()) return {std::nullopt, Reason::moves_unseen};
-    return {start_state(times_.front(), x_), Reason::none, fit_.motion_information(x_)};
+    return {start_state(times_.front(), x_), Reason::none, fit_.motion_information(x_),
+            ImuNoiseFactors{std::sqrt(noisier_[0]), std::sqrt(noisier_[1])}};
   }
 
  private:
@@ -111,6 +121,7 @@ class Problem {
   void add_turn(std::size_t k, Eigen::Matrix3d& A, Eigen::Vector3d& b) const;
   void guess();
   double iterate();
+  void measure_noise(const Eigen::MatrixXd& W, const Eigen::MatrixXd& covariance);
   [[nodiscard]] bool fits() const;
   [[nodiscard]] bool shows_length() const;
   void integrate();
@@ -122,16 +133,20 @@ class Problem {
   std::vector<Point> points_;
   std::vector<StartMoment> moments_;
   std::vector<PointSums> sums_;
+  std::vector<PointImage> images_;  ///< of the point at hand
   StartFit::Vector x_ = StartFit::Vector::Zero();
-  Eigen::VectorXd errors_;  ///< of the positions but the first [m]
-  Eigen::MatrixXd errors_information_;
-  StartFit fit_;  ///< of the last iteration
+  Eigen::VectorXd errors_;                      ///< of the path, as path_noise() has them
+  std::array<Eigen::MatrixXd, 2> stated_;       ///< their covariance by the stated noise: gyroscope's, accelerometer's
+  std::array<double, 2> noisier_ = {1.0, 1.0};  ///< factors on these
+  StartFit fit_;                                ///< of the last iteration
 };
 
 void Problem::integrate() {
   moments_ = start_moments(times_, x_, imu_);
   for (std::size_t k = 1; k < moments_.size(); ++k) {
-    moments_[k].error = errors_.segment<3>(3 * static_cast<Eigen::Index>(k) - 3);
+    const auto error = errors_.segment<StartMoment::errors>(errors_before(k));
+    moments_[k].sums.R = exp_so3(error.head<3>()) * moments_[k].sums.R;
+    moments_[k].error = error.tail<3>();
   }
 }
 
@@ -222,33 +237,40 @@ double Problem::iterate() {
     Point& point = points_[i];
     PointSums& sums = sums_[i];
     sums.clear(shared.b.size());
+    images_.clear();
     for (const Sight& sight : point.sights) {
-      const PointImage image = image_of(point.value, x_, moments_[sight.moment], T_BC_);
-      point.in_front = point.in_front && image.depth > kLeastDepth;
-      if (!point.in_front) break;
+      images_.push_back(image_of(point.value, x_, moments_[sight.moment], T_BC_));
+      point.in_front = point.in_front && images_.back().depth > kLeastDepth;
+    }
+    if (!point.in_front) continue;
+    for (std::size_t s = 0; s < images_.size(); ++s) {
+      const Sight& sight = point.sights[s];
+      const PointImage& image = images_[s];
       const Eigen::Vector2d r = sight.uv - image.uv;
       const double weight = weight_of(r.norm(), noise_.feature_sigma);
       const Eigen::Matrix<double, StartFit::size, 2> by_state = weight * image.by_state.transpose();
-      const Eigen::Matrix<double, 3, 2> by_position = weight * image.by_position.transpose();
       sums.A += weight * image.by_point.transpose() * image.by_point;
       sums.b += weight * image.by_point.transpose() * r;
       sums.A_others.topRows<n>() += by_state * image.by_point;
       shared.A.topLeftCorner<n, n>() += by_state * image.by_state;
       shared.b.head<n>() += by_state * r;
       if (sight.moment == 0) continue;
-      const Eigen::Index at = n + 3 * static_cast<Eigen::Index>(sight.moment) - 3;
-      sums.A_others.middleRows<3>(at) += by_position * image.by_point;
-      shared.A.block<3, n>(at, 0) += by_position * image.by_state;
-      shared.A.block<3, 3>(at, at) += by_position * image.by_position;
-      shared.b.segment<3>(at) += by_position * r;
+      const Eigen::Index at = n + errors_before(sight.moment);
+      Eigen::Matrix<double, 2, StartMoment::errors> by_error;
+      by_error << image.by_turn, image.by_position;
+      const Eigen::Matrix<double, StartMoment::errors, 2> weighted = weight * by_error.transpose();
+      sums.A_others.middleRows<StartMoment::errors>(at) += weighted * image.by_point;
+      shared.A.block<StartMoment::errors, n>(at, 0) += weighted * image.by_state;
+      shared.A.block<StartMoment::errors, StartMoment::errors>(at, at) += weighted * by_error;
+      shared.b.segment<StartMoment::errors>(at) += weighted * r;
     }
-    if (!point.in_front) continue;  // its rows so far are few
     shared.eliminate(sums);
   }
   const Eigen::Index m = errors_.size();
-  Eigen::MatrixXd A_e = shared.A.bottomRightCorner(m, m) + errors_information_;
+  const Eigen::MatrixXd W = (noisier_[0] * stated_[0] + noisier_[1] * stated_[1]).inverse();
+  const Eigen::MatrixXd A_e = shared.A.bottomRightCorner(m, m) + W;
   const Eigen::MatrixXd A_ex = shared.A.bottomLeftCorner(m, n);
-  const Eigen::VectorXd b_e = shared.b.tail(m) - errors_information_ * errors_;
+  const Eigen::VectorXd b_e = shared.b.tail(m) - W * errors_;
   const Eigen::LDLT<Eigen::MatrixXd> of_A_e(A_e);
   fit_ = StartFit(noise_.prior, x_);
   fit_.add(shared.A.topLeftCorner<n, n>() - A_ex.transpose() * of_A_e.solve(A_ex),
@@ -259,8 +281,24 @@ double Problem::iterate() {
   x_ += step.head<n>();
   errors_ += step.tail(m);
   for (std::size_t i = 0; i < points_.size(); ++i) points_[i].value += sums_[i].step(step);
-  const double variance = fit_.information(x_).inverse().topLeftCorner<3, 3>().trace();
+  const StartFit::Matrix covariance = fit_.information(x_).inverse();
+  const Eigen::MatrixXd by_state = of_A_e.solve(A_ex);
+  measure_noise(W, of_A_e.solve(Eigen::MatrixXd::Identity(m, m)) + by_state * covariance * by_state.transpose());
+  const double variance = covariance.topLeftCorner<3, 3>().trace();
   return step.segment<3>(StartFit::velocity).norm() / std::sqrt(variance);
+}
+
+/// How noisy the inertial samples are, by the errors of the path, of this covariance; W is the inverse of that by the
+/// noise believed so far. Of each part the squares over what the images determine of them (MacKay 1992), and the stated
+/// noise counts for some.
+void Problem::measure_noise(const Eigen::MatrixXd& W, const Eigen::MatrixXd& covariance) {
+  const Eigen::VectorXd weighted = W * errors_;
+  const Eigen::MatrixXd seen = W - W * covariance * W;
+  for (std::size_t i = 0; i < 2; ++i) {
+    const double squares = noisier_[i] * noisier_[i] * weighted.dot(stated_[i] * weighted);
+    const double determined = noisier_[i] * stated_[i].cwiseProduct(seen).sum();
+    noisier_[i] = std::max(1.0, (1.0 + squares) / (1.0 + determined));
+  }
 }
 
 /// The images, and what was known before.
@@ -279,10 +317,7 @@ bool Problem::fits() const {
     }
     fitting += worst < kClear ? 1 : 0;
   }
-  const double path_squares = errors_.dot(errors_information_ * errors_);
-  if (!fit_.expected(x_, kClear) || path_squares > kClear * kClear * static_cast<double>(errors_.size())) {
-    return false;
-  }
+  if (!fit_.expected(x_, kClear) || std::max(noisier_[0], noisier_[1]) > ImuScore::kFarthest) return false;
   return squares <= kWorstFit * rows && fitting >= std::max<std::size_t>(kToKnow, points_.size() / 2);
 }
 
@@ -356,20 +391,20 @@ PointImage image_of(const Eigen::Vector3d& point, const StartFit::Vector& x, con
   image.by_point << by_body * R_kB * R_BC.leftCols<2>(), by_body * (R_kB * shift - T_BC.p);
   image.by_position = -inverse_depth * by_body * R_kB;
   image.by_state = image.by_position * moment.position_by_state();
-  const Eigen::Matrix<double, 2, 3> by_turn = by_body * R_kB * skew(y);
-  image.by_state.middleCols<3>(StartFit::gyro_bias) += by_turn * moment.sums.R_by_b_g;
-  image.by_state.col(StartFit::time_offset) += by_turn * moment.turn_by_offset;
+  image.by_turn = by_body * R_kB * skew(y);
+  image.by_state.middleCols<3>(StartFit::gyro_bias) += image.by_turn * moment.sums.R_by_b_g;
+  image.by_state.col(StartFit::time_offset) += image.by_turn * moment.turn_by_offset;
   image.by_state.middleCols<3>(StartFit::camera_rotation) +=
       by_body * (skew(R_kB * y) - R_kB * skew(direction) - inverse_depth * skew(T_BC.p));
   return image;
 }
 
-/// The error of turn, velocity and position, all in B, from piece to piece; with it go its covariances with the
-/// positions before.
+/// The error of turn, velocity and position, all in B, from piece to piece; with it go its covariances with those
+/// before.
 Eigen::MatrixXd path_noise(const std::vector<TimeNs>& times, const StartFit::Vector& x, const ImuBuffer& imu,
                            const ImuCalibration& noise) {
   using Matrix9 = Eigen::Matrix<double, 9, 9>;
-  const Eigen::Index size = 3 * static_cast<Eigen::Index>(times.size()) - 3;
+  const Eigen::Index size = errors_before(times.size());
   Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(size, size);
   Eigen::Matrix<double, Eigen::Dynamic, 9> earlier = Eigen::Matrix<double, Eigen::Dynamic, 9>::Zero(size, 9);
   Matrix9 P = Matrix9::Zero();
@@ -390,10 +425,14 @@ Eigen::MatrixXd path_noise(const std::vector<TimeNs>& times, const StartFit::Vec
           earlier = earlier * F.transpose();
           sums.add(gyro_B - x.segment<3>(StartFit::gyro_bias), accel, dt);
         });
-    const Eigen::Index at = 3 * static_cast<Eigen::Index>(k) - 3;
-    earlier.middleRows<3>(at) = P.bottomRows<3>();
-    covariance.block(0, at, at + 3, 3) = earlier.topRows(at + 3).rightCols<3>();
-    covariance.block(at, 0, 3, at + 3) = earlier.topRows(at + 3).rightCols<3>().transpose();
+    const Eigen::Index at = errors_before(k);
+    earlier.middleRows<3>(at) = P.topRows<3>();
+    earlier.middleRows<3>(at + 3) = P.bottomRows<3>();
+    for (const Eigen::Index part : {0, 3}) {  // turn and position
+      const auto with_earlier = earlier.topRows(at + StartMoment::errors).middleCols<3>(2 * part);
+      covariance.block(0, at + part, at + StartMoment::errors, 3) = with_earlier;
+      covariance.block(at + part, 0, 3, at + StartMoment::errors) = with_earlier.transpose();
+    }
   }
   return covariance;
 }

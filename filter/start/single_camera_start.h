@@ -29,20 +29,23 @@ struct StartNoise {
 
 /// A state at the first of the frames. Least squares (Gauss-Newton, Huber) over the velocity v and gravity g of that
 /// moment, in the body as it then was (B), the biases, the camera's turn and time offset, the points seen, and what the
-/// noise of the inertial samples adds up to, e:
+/// noise of the inertial samples adds up to, e, in each moment's turn and position:
 ///   p_k = v t_k + g t_k^2 / 2 + double integral of R f + e_k
+/// That noise is measured, too, by how far e is from zero, as a factor on what is stated.
 /// It is a point to linearize at, not an estimate: the frames may be used again. It lacks few_frames, or
 /// cameras_contradict where the images do not fit, or moves_unseen where they do not show the length of the path.
 [[nodiscard]] StartAttempt single_camera_start(const std::vector<SeenFrame>& frames, const ImuBuffer& imu,
                                                const CameraState& camera, const StartNoise& noise);
 
-/// Covariance of all e_k but the first, which is zero, for frames at `times`, oldest first, by the noise of the samples
-/// and the biases of x [m^2].
+/// Covariance of the errors of turn [rad] and position [m], e_k, of all frames but the first, where they are zero. For
+/// frames at `times`, oldest first, by the noise of the samples and the biases of x.
 [[nodiscard]] Eigen::MatrixXd path_noise(const std::vector<TimeNs>& times, const StartFit::Vector& x,
                                          const ImuBuffer& imu, const ImuCalibration& noise);
 
 /// A frame of the fit.
 struct StartMoment {
+  static constexpr int errors = 6;  ///< turn [rad] and position [m] by the noise of the inertial samples
+
   double t = 0.0;  ///< [s] since the first
   StartSums sums;  ///< with the biases of the fit's state
   /// Derivatives of the sums by the time offset, which shifts this moment and the first: of the turn in B [rad/s], and
@@ -67,7 +70,7 @@ struct PointImage {
   Eigen::Vector2d uv;
   Eigen::Matrix<double, 2, 3> by_point;
   Eigen::Matrix<double, 2, StartFit::size> by_state;
-  Eigen::Matrix<double, 2, 3> by_position;  ///< of the body
+  Eigen::Matrix<double, 2, 3> by_turn, by_position;  ///< of the body, in B
 };
 /// `point`: its direction (alpha, beta, 1) and its inverse depth [1/m] in the camera at the first moment, as (alpha,
 /// beta, inverse depth). `T_BC`: as calibrated, without what x has of it.

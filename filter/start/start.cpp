@@ -113,6 +113,7 @@ MapAlignment Start::begin(const StartState& start, const std::optional<Estimate>
     }
   }
   if (start.from_frames) {
+    if (start.imu_noise) sources.imu_score().set_start(*start.imu_noise);
     ingest.drop_before(start.x.t_ns);
     const FrameStatistics statistics = records.statistics;
     for (std::size_t i = 0; i + 1 < moving_.frames().size(); ++i) {
@@ -195,6 +196,7 @@ StartState Start::in_motion(const StartAttempt& attempt) const {
   J.block<3, 3>(StartFit::accel_bias, err::b_a).setIdentity();
   start.H = attempt.information->llt().matrixU() * J / kWorstFit;
   start.residual.setZero(StartFit::motion_size);
+  start.imu_noise = attempt.imu_noise;
   return start;
 }
 

@@ -25,6 +25,7 @@ struct StartState {
   /// that stands, what was given of the velocity, or what the fit of one camera in motion knows. Else no rows.
   Eigen::Matrix<double, Eigen::Dynamic, err::imu_size> H;
   Eigen::VectorXd residual;
+  std::optional<ImuNoiseFactors> imu_noise;  ///< on the stated noise, as one camera in motion shows it
   bool from_frames = false;  ///< in motion, at the first of the frames kept: all of them are to be taken in
   std::optional<MapAlignment> alignment;  ///< where it was given
 };

@@ -9,6 +9,7 @@
 #include "ear/health.h"
 #include "ear/types.h"
 #include "filter/ekf/state.h"
+#include "filter/ingest/imu_buffer.h"
 
 namespace ear {
 
@@ -72,6 +73,7 @@ struct StartAttempt {
   std::optional<ImuState> x;
   Reason lacks = Reason::none;
   std::optional<StartFit::MotionMatrix> information = std::nullopt;  ///< the inverse of its covariance, if known
+  std::optional<ImuNoiseFactors> imu_noise = std::nullopt;           ///< on the stated noise, if known
 };
 
 /// The shortest turn that takes the direction of `a` to that of `b`; neither is zero.
