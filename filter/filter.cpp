@@ -89,10 +89,10 @@ void Filter::start(const FeatureFrame& frame) {
   Start::Situation now{frame, t_ns, lost ? ImuStatistics{} : sources_.standstill().recent(ingest_.imu(), t_ns)};
   now.stands = sources_.standstill().stands();
   now.rolls = sources_.on_ground();
-  now.restarts = lost || without_state_ == Status::lost;
   now.lost = lost;
   now.contradicted = health_.contradicted();
-  if (!now.restarts) without_state_ = now.recent.count < 2 ? Status::waiting_for_imu : Status::waiting_for_standstill;
+  if (!lost && without_state_ != Status::lost)
+    without_state_ = now.recent.count < 2 ? Status::waiting_for_imu : Status::waiting_for_standstill;
   const std::optional<StartState> found = start_.find(now, ingest_);
   if (!found) return;
   if (lost) stop();

@@ -44,8 +44,6 @@ const char* to_text(Reason reason) {
       return "it moves, and frames whose features fit each other do not span 1.5 s yet";
     case Reason::cameras_contradict:
       return "it moves, and cameras and inertial samples show different motions";
-    case Reason::slow:
-      return "it moves too slowly for a start in motion, and does not stand";
     case Reason::start_is_ahead:
       return "the time of the start that was given has not come";
     case Reason::start_is_past:

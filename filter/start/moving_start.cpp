@@ -74,7 +74,7 @@ StartAttempt MovingStart::solve(const ImuBuffer& imu, const CameraState& cameras
   std::vector<SeenFrame> seen;
   for (const TimedFrame& frame : frames_) seen.push_back({frame.t_ns, &frame.features});
   StartAttempt attempt = single_camera_start(seen, imu, cameras, noise_);
-  lacked_ = attempt.x ? Reason::slow : attempt.lacks;  // else it is not asked again
+  lacked_ = attempt.lacks;
   return attempt;
 }
 

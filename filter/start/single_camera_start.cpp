@@ -21,6 +21,7 @@ namespace {
 
 constexpr std::size_t kMoments = 12;  // chosen: frames that are used, evenly spaced
 constexpr int kIterations = 20;       // chosen
+constexpr double kKnownLength = 0.1;  // chosen: share of the path to which its length must be known
 
 struct Sight {
   std::size_t moment;
@@ -329,7 +330,7 @@ bool Problem::shows_length() const {
   const StartMoment& farthest = *std::max_element(moments_.begin(), moments_.end(), before);
   const Eigen::Vector3d p = farthest.position(x_);
   const StartFit::Vector J = farthest.position_by_state().transpose() * p.normalized();
-  return J.dot(fit_.information(x_).ldlt().solve(J)) < std::pow(kPrecise * p.norm(), 2);
+  return J.dot(fit_.information(x_).ldlt().solve(J)) < std::pow(kKnownLength * p.norm(), 2);
 }
 
 }  // namespace

@@ -15,7 +15,6 @@ namespace {
 
 constexpr double kMovingVelocity = 0.5;    // [m/s] chosen: and share of the speed, before the window is used
 constexpr double kGravityTolerance = 1.5;  // [m/s^2] chosen: of the specific force at rest; more is a wrong unit
-constexpr double kLeastStartSpeed = 0.2;   // [m/s] chosen: a first start in motion; slower is as good as standing
 constexpr double kUnknownTilt = 0.3;       // [rad] chosen: before gravity was measured
 
 constexpr double kVague = 10.0;          // chosen: times the sigma of a velocity that is then measured with that sigma
@@ -77,11 +76,8 @@ std::optional<StartState> Start::find(const Situation& now, const Ingest& ingest
   }
   if (start) return start;
   start = moving(now, ingest.imu());
-  // A first start can wait for the vehicle to stand, which shows gravity and biases better, or to move.
-  const bool waits = start && !now.restarts && start->x.v_W.norm() < kLeastStartSpeed;
-  if (waits) waits_for_ = Reason::slow;
   if (calibration_.cameras.empty() || lacks == Reason::other_gravity || now.rolls) waits_for_ = lacks;
-  return waits ? std::nullopt : start;
+  return start;
 }
 
 std::optional<StartState> Start::moving(const Situation& now, const ImuBuffer& imu) {

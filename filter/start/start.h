@@ -48,7 +48,6 @@ class Start {
     ImuStatistics recent;  ///< of the inertial samples
     bool stands = false;
     bool rolls = false;         ///< the wheels carry it
-    bool restarts = false;      ///< not the first start
     bool lost = false;          ///< there is a state
     bool contradicted = false;  ///< which the cameras contradict
   };

@@ -31,7 +31,6 @@ enum class Reason : std::uint8_t {
   wheels_contradict,   ///< it rolls: wheels and inertial samples show different motions, as with slip
   few_frames,          ///< it moves: the frames whose features fit each other do not yet span the time for a start
   cameras_contradict,  ///< it moves: cameras and inertial samples show different motions
-  slow,                ///< too slow for a first start in motion, too unsteady for one at rest
   start_is_ahead,      ///< the time of the start that was given is not yet there
   start_is_past,       ///< the inertial samples do not reach back to the start that was given
   vague_velocity,      ///< there is a state, whose velocity is not known well enough yet

@@ -31,7 +31,6 @@ void bind_words(py::module_& module) {
       .value("wheels_contradict", Reason::wheels_contradict)
       .value("few_frames", Reason::few_frames)
       .value("cameras_contradict", Reason::cameras_contradict)
-      .value("slow", Reason::slow)
       .value("start_is_ahead", Reason::start_is_ahead)
       .value("start_is_past", Reason::start_is_past)
       .value("vague_velocity", Reason::vague_velocity)

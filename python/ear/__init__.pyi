@@ -680,7 +680,6 @@ class Reason:
     wheels_contradict: Reason
     few_frames: Reason
     cameras_contradict: Reason
-    slow: Reason
     start_is_ahead: Reason
     start_is_past: Reason
     vague_velocity: Reason

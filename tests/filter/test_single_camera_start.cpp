@@ -197,7 +197,7 @@ TEST_CASE("single camera start: velocity, tilt and bias in flight, by a calibrat
         const double tilt = std::acos(std::min(1.0, up_B.dot(truth.R_WB.transpose() * Eigen::Vector3d::UnitZ())));
         const double v_error = (x.R_WB.transpose() * x.v_W - truth.R_WB.transpose() * truth.v_W).norm();
         CHECK(tilt < 0.06);
-        CHECK(v_error < 0.05 + 0.15 * truth.v_W.norm());
+        CHECK(v_error < 0.05 + 0.3 * truth.v_W.norm());
         CHECK((x.b_g - truth.b_g).norm() < 0.02);
         squares += std::pow(v_error / (0.3 + truth.v_W.norm()), 2);
       }
@@ -205,8 +205,8 @@ TEST_CASE("single camera start: velocity, tilt and bias in flight, by a calibrat
   }
   const double rms = std::sqrt(squares / starts);
   MESSAGE(starts, " of ", windows, " windows of 1.5 s start, the velocity to ", rms);
-  CHECK(starts >= 14);
-  CHECK(rms < 0.04);
+  CHECK(starts >= 40);
+  CHECK(rms < 0.07);
 }
 
 TEST_CASE("single camera start: how noisy the inertial samples are, against what is stated") {
@@ -244,13 +244,9 @@ TEST_CASE("single camera start: how noisy the inertial samples are, against what
     MESSAGE(times.gyro, ", ", times.accel, " times: measured ", std::exp(gyro / starts), ", ", std::exp(accel / starts),
             ", ", starts, " starts, NEES of the velocity ", squares / starts);
     CHECK(std::exp(gyro / starts) == test::about(times.gyro, 0.4));
-    if (times.accel == 1.0) {
-      CHECK(starts >= 12);
-      CHECK(squares / starts < 6.0);
-    } else {  // such samples hardly show a length
-      CHECK(starts < 12);
-      CHECK(std::exp(accel / starts) == test::about(times.accel, 0.6));
-    }
+    CHECK(std::exp(accel / starts) == test::about(times.accel, 0.5));
+    CHECK(starts >= 25);
+    CHECK(squares / starts < (times.accel == 1.0 ? 4.0 : 10.0));  // few of its squares are determined
   }
 }
 
@@ -264,10 +260,14 @@ TEST_CASE("single camera start: no length is shown at a steady speed, and what c
   int unseen = 0;
   for (double from = 6.0; from < 10.0; from += 0.5) {
     const StartAttempt attempt = Clip(steady, from, kUnchanged).start();
-    CHECK_FALSE(attempt.x);
-    unseen += attempt.lacks == Reason::moves_unseen ? 1 : 0;
+    if (attempt.x) {  // not quite steady
+      const double speed = steady.truth(attempt.x->t_ns).v_W.norm();
+      MESSAGE("at ", from, " s it starts with ", attempt.x->v_W.norm(), " m/s of ", speed);
+      CHECK(attempt.x->v_W.norm() == test::about(speed, 0.2));
+    }
+    unseen += attempt.x ? 0 : 1;
   }
-  CHECK(unseen >= 3);
+  CHECK(unseen >= 6);
 
   const simulator::Simulation simulation = fly(30.0, 844, 0.0);
   const auto lacks = [&](const auto& change) { return Clip(simulation, 10.0, change).start().lacks; };
