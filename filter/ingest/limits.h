@@ -31,7 +31,8 @@ inline constexpr double kFastest = 100.0;  ///< [m/s] chosen: no vehicle with wh
 
 /// [s] chosen: of what a regression is made of, of an interval, which a crystal keeps, and of how late stamps are.
 inline constexpr double kSlopeMemory = 100.0;
-/// Chosen: share of the path to which a position is known: two standard deviations while tracking, one at a start.
+/// Chosen: of the path, two standard deviations of the position while tracking; a fit has settled when it moves by no
+/// more, in standard deviations.
 inline constexpr double kPrecise = 0.05;
 /// [s] chosen: of the noise of inertial samples: a single image that is wrong changes little.
 inline constexpr double kNoiseMemory = 2.0;

@@ -273,8 +273,9 @@ double Problem::iterate() {
   const Eigen::MatrixXd A_ex = shared.A.bottomLeftCorner(m, n);
   const Eigen::VectorXd b_e = shared.b.tail(m) - W * errors_;
   const Eigen::LDLT<Eigen::MatrixXd> of_A_e(A_e);
+  const Eigen::MatrixXd by_state = of_A_e.solve(A_ex);
   fit_ = StartFit(noise_.prior, x_);
-  fit_.add(shared.A.topLeftCorner<n, n>() - A_ex.transpose() * of_A_e.solve(A_ex),
+  fit_.add(shared.A.topLeftCorner<n, n>() - A_ex.transpose() * by_state,
            shared.b.head<n>() - A_ex.transpose() * of_A_e.solve(b_e));
   Eigen::VectorXd step(n + m);
   step.head<n>() = fit_.step(x_);
@@ -283,15 +284,14 @@ double Problem::iterate() {
   errors_ += step.tail(m);
   for (std::size_t i = 0; i < points_.size(); ++i) points_[i].value += sums_[i].step(step);
   const StartFit::Matrix covariance = fit_.information(x_).inverse();
-  const Eigen::MatrixXd by_state = of_A_e.solve(A_ex);
   measure_noise(W, of_A_e.solve(Eigen::MatrixXd::Identity(m, m)) + by_state * covariance * by_state.transpose());
   const double variance = covariance.topLeftCorner<3, 3>().trace();
   return step.segment<3>(StartFit::velocity).norm() / std::sqrt(variance);
 }
 
 /// How noisy the inertial samples are, by the errors of the path, of this covariance; W is the inverse of that by the
-/// noise believed so far. Of each part the squares over what the images determine of them (MacKay 1992), and the stated
-/// noise counts for some.
+/// noise believed so far. Of each part the squares over what the images determine of them (MacKay 1992); the stated
+/// noise counts for one more.
 void Problem::measure_noise(const Eigen::MatrixXd& W, const Eigen::MatrixXd& covariance) {
   const Eigen::VectorXd weighted = W * errors_;
   const Eigen::MatrixXd seen = W - W * covariance * W;

@@ -1,5 +1,5 @@
-// Where the filter begins: as given, standing, rolling, or in motion with two cameras. Each gives a start
-// state, or nothing. docs/filter.md, "Starts".
+// Where the filter begins: as given, standing, rolling, or in motion, with two cameras or one. Each gives a
+// start state, or nothing. docs/filter.md, "Starts".
 #pragma once
 
 #include <Eigen/Core>
@@ -51,8 +51,8 @@ class Start {
     bool lost = false;          ///< there is a state
     bool contradicted = false;  ///< which the cameras contradict
   };
-  /// The one that was given, or else the first that can: standing, rolling, moving with two cameras. Where there is a
-  /// state, moving alone, once that is contradicted.
+  /// The one that was given, or else the first that can: standing, rolling, moving. Where there is a state, moving
+  /// alone, once that is contradicted.
   [[nodiscard]] std::optional<StartState> find(const Situation& now, const Ingest& ingest);
   void forget_frames() { moving_.clear(); }
 

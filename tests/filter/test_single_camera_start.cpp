@@ -165,8 +165,9 @@ TEST_CASE("single camera start: the noise of the path is that of many integratio
     const std::vector<StartMoment> noisy = start_moments(times, x, samples(1.0));
     Eigen::VectorXd e(12);
     for (std::size_t k = 1; k < times.size(); ++k) {
-      e.segment<3>(6 * static_cast<Eigen::Index>(k) - 6) = log_so3(noisy[k].sums.R * exact[k].sums.R.transpose());
-      e.segment<3>(6 * static_cast<Eigen::Index>(k) - 3) = noisy[k].position(x) - exact[k].position(x);
+      auto errors = e.segment<StartMoment::errors>(StartMoment::errors * static_cast<Eigen::Index>(k - 1));
+      errors.head<3>() = log_so3(noisy[k].sums.R * exact[k].sums.R.transpose());
+      errors.tail<3>() = noisy[k].position(x) - exact[k].position(x);
     }
     drawn += e * e.transpose() / kDraws;
   }

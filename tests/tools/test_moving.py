@@ -101,7 +101,7 @@ class Clip(unittest.TestCase):
             result = self.run_program("evaluate", output, recording, "--json")
         figures = json.loads(result.stdout)["estimates"][0]
         print(f"{recording.name}: ATE {1e3 * figures['ate_rmse_m']:.1f} mm", file=sys.stderr)
-        self.assertLess(figures["ate_rmse_m"], 0.1)
+        self.assertLess(figures["ate_rmse_m"], 0.03)
 
     def test_one_camera_on_a_car_at_a_steady_speed_does_not_start(self):
         recording = self.clip("kitti_a")
