@@ -126,13 +126,9 @@ std::optional<Estimate> Smoother::report(bool image, const FrameAgreement& seen)
 
 /// As the filter does. From there on the window has its state and covariance.
 void Smoother::start(const FeatureFrame& frame, TimeNs t_ns) {
-  const bool stands = sources_.standstill().stands();
-  const Start::Situation now{frame,
-                             t_ns,
-                             sources_.standstill().recent(ingest_.imu(), t_ns),
-                             stands,
-                             sources_.on_ground(),
-                             last_good_.has_value()};
+  Start::Situation now{frame, t_ns, sources_.standstill().recent(ingest_.imu(), t_ns)};
+  now.stands = sources_.standstill().stands();
+  now.rolls = sources_.on_ground();
   const std::optional<StartState> found = start_.find(now, ingest_);
   if (!found) return;
   alignment_ = start_.begin(*found, last_good_, Advice{}, ingest_, ekf_, sources_, records_);
@@ -140,8 +136,8 @@ void Smoother::start(const FeatureFrame& frame, TimeNs t_ns) {
   sources_.reset();
   const Eigen::MatrixXd P = ekf_.covariance().matrix().topLeftCorner<err::clones, err::clones>();
   window_ = std::make_unique<Window>(config_, focal_length(calibration_), ekf_.state(), P);
-  meter_.begin(stands);
-  records_.statistics.standing = stands;
+  meter_.begin(now.stands);
+  records_.statistics.standing = now.stands;
   assume_newest(*window_, meter_.normal(), P, ekf_);
 }
 
