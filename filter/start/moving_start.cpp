@@ -15,7 +15,6 @@ namespace {
 
 constexpr std::size_t kFewestFrames = 8;  // chosen: 42 rows for 12 unknowns, whatever the frames' rate
 constexpr double kScaleSigma = 0.02;  // chosen: of a path; noise of the disparities makes points too near or too far
-constexpr double kAccelSigma = 0.3;   // [m/s^2] chosen: what a poor accelerometer may be off between two frames
 
 /// The same image twice: no two exposures are exactly equal, and nothing shows how the vehicle moves.
 bool frozen(const std::vector<StereoMatch>& matches) {
@@ -108,9 +107,7 @@ StartFit MovingStart::fit_to_motions(const Eigen::Vector3d& b_g, const ImuBuffer
     H.middleCols<3>(StartFit::accel_bias) = sums.position_by_b_a - before.position_by_b_a;
     const Eigen::Vector3d z = path - (sums.position - before.position) + H.middleCols<3>(StartFit::gyro_bias) * b_g;
     const double scale = kScaleSigma * path.norm();
-    const double unsteady = kAccelSigma * (t1 - t0) * (t1 - t0);
-    const double variance = motion.p_covariance().trace() / 3.0 + unsteady * unsteady + scale * scale;
-    fit.add(H, z, variance);
+    fit.add(H, z, motion.p_covariance().trace() / 3.0 + scale * scale);
 
     const Eigen::Matrix3d R = before.R.transpose() * sums.R;
     StartFit::Rows H_turn = StartFit::Rows::Zero();

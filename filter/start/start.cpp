@@ -16,9 +16,7 @@ namespace {
 constexpr double kMovingVelocity = 0.5;    // [m/s] chosen: and share of the speed, before the window is used
 constexpr double kGravityTolerance = 1.5;  // [m/s^2] chosen: of the specific force at rest; more is a wrong unit
 constexpr double kUnknownTilt = 0.3;       // [rad] chosen: before gravity was measured
-
-constexpr double kVague = 10.0;          // chosen: times the sigma of a velocity that is then measured with that sigma
-constexpr double kUnitTolerance = 1e-3;  // chosen: of the length of a quaternion: digits that were cut off
+constexpr double kUnitTolerance = 1e-3;    // chosen: of the length of a quaternion: digits that were cut off
 
 }  // namespace
 
@@ -136,8 +134,7 @@ std::optional<StartState> Start::as_given(TimeNs t_ns, const ImuBuffer& imu) {
   start.sigma = sigma();
   const double yaw = std::max(given_->yaw_sigma, kKnownSigma);
   start.sigma.segment<3>(err::theta) << given_->tilt_sigma, given_->tilt_sigma, yaw;
-  start.sigma.segment<3>(err::nu).setConstant(
-      kVague * std::hypot(given_->velocity_sigma, given.v_W.norm() * std::hypot(given_->tilt_sigma, yaw)));
+  start.sigma.segment<3>(err::nu).setConstant(kFastest);  // it is measured below
   if (given_->gyro_bias_sigma) start.sigma.segment<3>(err::b_g).setConstant(*given_->gyro_bias_sigma);
   if (given_->accel_bias_sigma) start.sigma.segment<3>(err::b_a).setConstant(*given_->accel_bias_sigma);
   start.H.setZero(3, err::imu_size);

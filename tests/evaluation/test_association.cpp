@@ -46,13 +46,14 @@ TEST_CASE("association: no truth across its gaps, but on their edges") {
   Trajectory truth = line(0.0, 2.0, 0.02);
   const Trajectory later = line(3.0, 5.0, 0.02);
   truth.insert(truth.end(), later.begin(), later.end());
-  const Association result = associate(line(0.0, 5.0, 0.1), truth);
+  const Trajectory estimate = line(0.0, 5.0, 0.1);
+  const Association result = associate(estimate, truth);
   CHECK(result.outside == 0);
   CHECK(result.in_gaps == 9);  // 2.1 to 2.9
   CHECK(result.matches.size() == 42);
   CHECK(result.matches.front().segment == 0);
   CHECK(result.matches.back().segment == 1);
-  CHECK(coverage(result, truth) == doctest::Approx(1.0));
+  CHECK(coverage(estimate, truth) == doctest::Approx(1.0));
 }
 
 TEST_CASE("association: a gap is three median intervals, but at least 0.1 s") {
@@ -69,12 +70,23 @@ TEST_CASE("association: poses a century apart lie within the largest gap that th
 
 TEST_CASE("coverage: the share of the truth's time in which the estimate runs") {
   const Trajectory truth = line(0.0, 10.0, 0.02);
-  CHECK(coverage(associate(line(2.5, 7.5, 0.1), truth), truth) == doctest::Approx(0.5));
+  CHECK(coverage(line(2.5, 7.5, 0.1), truth) == doctest::Approx(0.5));
 
   Trajectory interrupted = line(0.0, 3.0, 0.1);
   const Trajectory later = line(5.0, 10.0, 0.1);
   interrupted.insert(interrupted.end(), later.begin(), later.end());
-  CHECK(coverage(associate(interrupted, truth), truth) == doctest::Approx(0.8));
+  CHECK(coverage(interrupted, truth) == doctest::Approx(0.8));
+}
+
+TEST_CASE("coverage: between two poses of an estimate a short piece of the truth counts, too") {
+  Trajectory truth = line(0.0, 2.0, 0.01);
+  for (const double from : {2.31, 2.62, 2.93}) {
+    const Trajectory piece = line(from, from + 0.05, 0.01);
+    truth.insert(truth.end(), piece.begin(), piece.end());
+  }
+  CHECK(coverage(line(0.0, 3.0, 0.1), truth) == doctest::Approx(1.0));
+  CHECK(coverage(line(0.0, 2.6, 0.1), truth) == doctest::Approx(2.05 / 2.15));
+  CHECK(coverage({}, truth) == 0.0);
 }
 
 }  // namespace

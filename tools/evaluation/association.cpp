@@ -17,11 +17,26 @@ std::vector<int> gaps_before(const Trajectory& trajectory) {
   return counts;
 }
 
-TimeNs known_time_ns(const Trajectory& trajectory) {
+struct Interval {
+  TimeNs from_ns = 0, to_ns = 0;
+  [[nodiscard]] TimeNs length() const { return to_ns - from_ns; }
+};
+
+/// Between its gaps, in order.
+std::vector<Interval> runs(const Trajectory& trajectory) {
   const std::vector<int> gaps = gaps_before(trajectory);
+  std::vector<Interval> result;
+  for (std::size_t i = 0; i < trajectory.size(); ++i) {
+    const TimeNs t_ns = trajectory[i].t_ns;
+    if (i == 0 || gaps[i] != gaps[i - 1]) result.push_back({t_ns, t_ns});
+    result.back().to_ns = t_ns;
+  }
+  return result;
+}
+
+TimeNs known_time_ns(const Trajectory& trajectory) {
   TimeNs known = 0;
-  for (std::size_t i = 1; i < trajectory.size(); ++i)
-    if (gaps[i] == gaps[i - 1]) known += trajectory[i].t_ns - trajectory[i - 1].t_ns;
+  for (const Interval& run : runs(trajectory)) known += run.length();
   return known;
 }
 
@@ -69,12 +84,16 @@ Association associate(const Trajectory& estimate, const Trajectory& truth) {
 
 double known_time(const Trajectory& trajectory) { return 1e-9 * static_cast<double>(known_time_ns(trajectory)); }
 
-double coverage(const Association& association, const Trajectory& truth) {
+double coverage(const Trajectory& estimate, const Trajectory& truth) {
   const TimeNs known = known_time_ns(truth);
+  const std::vector<Interval> estimated = runs(estimate);
   TimeNs covered = 0;
-  const std::vector<Match>& matches = association.matches;
-  for (std::size_t i = 1; i < matches.size(); ++i)
-    if (matches[i].segment == matches[i - 1].segment) covered += matches[i].truth.t_ns - matches[i - 1].truth.t_ns;
+  auto first = estimated.begin();
+  for (const Interval& run : runs(truth)) {
+    while (first != estimated.end() && first->to_ns <= run.from_ns) ++first;
+    for (auto it = first; it != estimated.end() && it->from_ns < run.to_ns; ++it)
+      covered += Interval{std::max(it->from_ns, run.from_ns), std::min(it->to_ns, run.to_ns)}.length();
+  }
   return known == 0 ? 0.0 : static_cast<double>(covered) / static_cast<double>(known);
 }
 

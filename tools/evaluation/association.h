@@ -35,6 +35,6 @@ struct Association {
 [[nodiscard]] double known_time(const Trajectory& trajectory);
 
 /// Share of the truth's time, its gaps left out, in which the estimate runs without a gap. In [0, 1].
-[[nodiscard]] double coverage(const Association& association, const Trajectory& truth);
+[[nodiscard]] double coverage(const Trajectory& estimate, const Trajectory& truth);
 
 }  // namespace ear::evaluation

@@ -252,7 +252,7 @@ Evaluation evaluate(const Estimate& estimate, const Truth& truth, AlignmentKind 
   result.matched = association.matches.size();
   result.outside = association.outside;
   result.in_gaps = association.in_gaps;
-  result.coverage = coverage(association, truth.poses);
+  result.coverage = coverage(estimate.poses, truth.poses);
   result.frames = compare_all(association, estimate, truth, distances, alignment.T_TE, kind);
   summarize(result);
   if (!estimate.covariance.empty()) result.nees = summarize_nees(result.frames);
