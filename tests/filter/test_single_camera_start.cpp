@@ -9,6 +9,7 @@
 
 #include "ear/filter_config.h"
 #include "filter/ekf/so3.h"
+#include "filter/start/start_moments.h"
 #include "tests/support/about.h"
 #include "tools/simulator/simulation.h"
 
