@@ -219,7 +219,10 @@ def evaluate(estimate, truth, extra, kind):
     angles = [np.linalg.norm(log(x @ y.T)) for x, y in zip(R_true, R_est)]
     s = travelled(t, p_all, times, p_true)
     known = t[-1] - t[0] - sum(b - a for a, b in gaps(t))
-    covered = sum(times[k + 1] - times[k] for k in range(len(times) - 1) if matches[k][3] == matches[k + 1][3])
+    holes = gaps(t)
+    absent = [(t[0], max(t[0], t_est[0])), *gaps(t_est), (min(t[-1], t_est[-1]), t[-1])]
+    missed = sum(max(0, min(b, d) - max(a, c)) for a, b in zip(t, t[1:]) if (a, b) not in holes for c, d in absent)
+    covered = known - missed
 
     has_covariance = "cov_x_x" in estimate
     S = attitude_rotation("yaw" if has_covariance else kind, R_true[:1], R_own[:1])

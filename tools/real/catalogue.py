@@ -63,7 +63,7 @@ HELD = {
                             "where the estimate's standard deviation is 0.16; the orientation's NEES is 47 there"),
     "kitti_a": Held("a car, stereo 10 Hz, starts at 7 m/s", "kitti_raw",
                     "of the IMU only 16 % of the packets exist, and its samples are 53 ms late against the attitude of the truth, "
-                    "which comes from the same device: in the turn at the start that is 1.2 degrees of yaw. The truth has gaps, each of which takes a frame's interval off the coverage"),
+                    "which comes from the same device: in the turn at the start that is 1.2 degrees of yaw"),
     "comma2k19": Held("a car on a motorway without a camera: wheels and a phone's IMU", "comma2k19",
                       "the odometer's mounting is a guess, and the wheels are 1 % larger than stated"),
     "ucsd_20": Held("a skid-steered robot indoors: wheels and IMU", "ucsd",
