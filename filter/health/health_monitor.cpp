@@ -191,9 +191,12 @@ bool HealthMonitor::velocity_known() const {
   return last_.speed < kFastest && last_.velocity_sigma < std::max(kWorstVelocity, kWorstDirection * last_.speed);
 }
 
+bool HealthMonitor::wheels_fit(const FrameStatistics& frame) const {
+  return wheels_ && frame.on_ground && frame.wheel_rows_used > frame.wheel_rows_rejected;
+}
+
 bool HealthMonitor::wheels_carry(const FrameStatistics& frame) const {
-  const bool sound = fault_of(Source::wheel_left).sound() || fault_of(Source::wheel_right).sound();
-  return wheels_ && frame.on_ground && sound && frame.wheel_rows_used > frame.wheel_rows_rejected;
+  return wheels_fit(frame) && (fault_of(Source::wheel_left).sound() || fault_of(Source::wheel_right).sound());
 }
 
 /// What carries the estimate, as far as the last frame is not too old.
@@ -212,8 +215,9 @@ void HealthMonitor::decide(TimeNs t_ns) {
     life_.aided_ns = life_.fitting_ns = t_ns;
   }
   health_.aiding = aiding_at(t_ns);
-  if (health_.aiding != Aiding::none) life_.aided_ns = t_ns;
   const bool fresh = seconds_between(last_.t_ns, t_ns) < kStale;
+  // Wheels that fit again measure, though they are not known to be sound yet.
+  if (health_.aiding != Aiding::none || (fresh && wheels_fit(last_.statistics))) life_.aided_ns = t_ns;
   const bool off = fresh && images_.come(t_ns) &&
                    ((last_.statistics.tracks >= kFewFeatures && last_.agreement.contradicts()) || images_.misfit());
   if (!off || (fresh && wheels_carry(last_.statistics))) life_.fitting_ns = t_ns;

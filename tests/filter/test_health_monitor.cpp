@@ -449,6 +449,33 @@ TEST_CASE("health: without cameras too, the estimate is lost when nothing but in
   CHECK(drive.health().status == HealthStatus::lost);
 }
 
+TEST_CASE("health: wheels that fit again after a slip keep the estimate, before they are known to be sound") {
+  Drive drive;
+  drive.frame.image = false;
+  drive.go_on(2.0);
+  const auto slip = [&](bool slips) {
+    drive.frame.statistics.wheel_rows_used = slips ? 6 : 15;
+    drive.frame.statistics.wheel_rows_rejected = slips ? 9 : 0;
+    for (const Source wheel : {Source::wheel_left, Source::wheel_right}) {
+      drive.records[index_of(wheel)].used = slips ? 0 : 3;
+      drive.records[index_of(wheel)].rejected = slips ? 3 : 0;
+    }
+  };
+  slip(true);
+  drive.go_on(1.8);
+  CHECK(drive.health().aiding == Aiding::none);
+  CHECK(drive.health().status == HealthStatus::degraded);
+  slip(false);
+  for (int i = 0; i < 8; ++i) {
+    drive.go_on(0.05);
+    CHECK(drive.health().status == HealthStatus::degraded);
+    CHECK(drive.health().faulty[index_of(Source::wheel_left)]);
+  }
+  slip(true);
+  drive.go_on(2.2);
+  CHECK(drive.health().status == HealthStatus::lost);
+}
+
 TEST_CASE("health: wheels that are slower than the frames carry the estimate until they are silent") {
   HealthMonitor monitor{[] {
                           Calibration calibration;
