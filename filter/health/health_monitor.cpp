@@ -39,6 +39,10 @@ int quality(const Health& health, int tracks) {
   return std::clamp(points, 1, health.status == HealthStatus::degraded ? kDegradedQuality : 100);
 }
 
+bool wheels_fit(const FrameStatistics& frame) {
+  return frame.on_ground && frame.wheel_rows_used > frame.wheel_rows_rejected;
+}
+
 }  // namespace
 
 HealthMonitor::HealthMonitor(const Calibration& calibration, bool uses_wheels, bool uses_beams)
@@ -191,12 +195,9 @@ bool HealthMonitor::velocity_known() const {
   return last_.speed < kFastest && last_.velocity_sigma < std::max(kWorstVelocity, kWorstDirection * last_.speed);
 }
 
-bool HealthMonitor::wheels_fit(const FrameStatistics& frame) const {
-  return wheels_ && frame.on_ground && frame.wheel_rows_used > frame.wheel_rows_rejected;
-}
-
 bool HealthMonitor::wheels_carry(const FrameStatistics& frame) const {
-  return wheels_fit(frame) && (fault_of(Source::wheel_left).sound() || fault_of(Source::wheel_right).sound());
+  return wheels_ && wheels_fit(frame) &&
+         (fault_of(Source::wheel_left).sound() || fault_of(Source::wheel_right).sound());
 }
 
 /// What carries the estimate, as far as the last frame is not too old.

@@ -80,7 +80,6 @@ class HealthMonitor {
   void note_silence(TimeNs t_ns);
   void decide(TimeNs t_ns);
   [[nodiscard]] Reason reason(TimeNs t_ns) const;
-  [[nodiscard]] bool wheels_fit(const FrameStatistics& frame) const;
   [[nodiscard]] bool wheels_carry(const FrameStatistics& frame) const;
   [[nodiscard]] Aiding aiding_at(TimeNs t_ns) const;
   [[nodiscard]] const FaultState& fault_of(Source source) const;
