@@ -49,12 +49,12 @@ std::vector<StartMoment> start_moments(const std::vector<TimeNs>& times, const S
 PointImage image_of(const Eigen::Vector3d& point, const StartFit::Vector& x, const StartMoment& moment,
                     const Pose& T_BC) {
   const Eigen::Matrix3d R_BC = exp_so3(x.segment<3>(StartFit::camera_rotation)) * T_BC.R;
-  const Eigen::Matrix3d R_kB = moment.sums.R.transpose();  // to the body at this moment
+  const Eigen::Matrix3d R_BkB = moment.sums.R.transpose();  // to the body at this moment
   const double inverse_depth = point.z();
   const Eigen::Vector3d shift = T_BC.p - moment.position(x);
   const Eigen::Vector3d direction = R_BC * point.head<2>().homogeneous();
   const Eigen::Vector3d y = direction + inverse_depth * shift;  // in B, from the body at this moment
-  const Eigen::Vector3d h = R_BC.transpose() * (R_kB * y - inverse_depth * T_BC.p);
+  const Eigen::Vector3d h = R_BC.transpose() * (R_BkB * y - inverse_depth * T_BC.p);
   PointImage image;
   image.depth = h.z();
   image.uv = h.head<2>() / h.z();
@@ -62,14 +62,14 @@ PointImage image_of(const Eigen::Vector3d& point, const StartFit::Vector& x, con
   by_h << Eigen::Matrix2d::Identity(), -image.uv;
   by_h /= h.z();
   const Eigen::Matrix<double, 2, 3> by_body = by_h * R_BC.transpose();
-  image.by_point << by_body * R_kB * R_BC.leftCols<2>(), by_body * (R_kB * shift - T_BC.p);
-  image.by_position = -inverse_depth * by_body * R_kB;
+  image.by_point << by_body * R_BkB * R_BC.leftCols<2>(), by_body * (R_BkB * shift - T_BC.p);
+  image.by_position = -inverse_depth * by_body * R_BkB;
   image.by_state = image.by_position * moment.position_by_state();
-  image.by_turn = by_body * R_kB * skew(y);
+  image.by_turn = by_body * R_BkB * skew(y);
   image.by_state.middleCols<3>(StartFit::gyro_bias) += image.by_turn * moment.sums.R_by_b_g;
   image.by_state.col(StartFit::time_offset) += image.by_turn * moment.turn_by_offset;
   image.by_state.middleCols<3>(StartFit::camera_rotation) +=
-      by_body * (skew(R_kB * y) - R_kB * skew(direction) - inverse_depth * skew(T_BC.p));
+      by_body * (skew(R_BkB * y) - R_BkB * skew(direction) - inverse_depth * skew(T_BC.p));
   return image;
 }
 
