@@ -216,9 +216,8 @@ void HealthMonitor::decide(TimeNs t_ns) {
     life_.aided_ns = life_.fitting_ns = t_ns;
   }
   health_.aiding = aiding_at(t_ns);
+  if (health_.aiding != Aiding::none) life_.aided_ns = t_ns;
   const bool fresh = seconds_between(last_.t_ns, t_ns) < kStale;
-  // Wheels that fit again measure, though they are not known to be sound yet.
-  if (health_.aiding != Aiding::none || (fresh && wheels_fit(last_.statistics))) life_.aided_ns = t_ns;
   const bool off = fresh && images_.come(t_ns) &&
                    ((last_.statistics.tracks >= kFewFeatures && last_.agreement.contradicts()) || images_.misfit());
   if (!off || (fresh && wheels_carry(last_.statistics))) life_.fitting_ns = t_ns;
@@ -232,8 +231,10 @@ void HealthMonitor::decide(TimeNs t_ns) {
     health_.faulty.set(i);
     health_.onset_ns[i] = fault.onset_ns();
   }
-  const bool usable = last_.running && last_.possible && seconds_between(life_.aided_ns, t_ns) < kLostAfter &&
-                      velocity_known() && !life_.contradicted;
+  // Wheels that fit again have the time to be known as sound.
+  const double granted = fresh && wheels_fit(last_.statistics) ? 1e-9 * FaultState::kSoundAfter : 0.0;
+  const bool usable = last_.running && last_.possible && velocity_known() && !life_.contradicted &&
+                      seconds_between(life_.aided_ns, t_ns) < kLostAfter + granted;
   const bool proven = !lost() || duration_ns(life_.unproven_ns, t_ns) >= FaultState::kSoundAfter;
   const double sigma = std::max(health_.horizontal_sigma, health_.vertical_sigma);
   health_.imprecise = 2.0 * sigma > std::max(kPreciseEnough, kPrecise * life_.travelled);
