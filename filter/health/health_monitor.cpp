@@ -232,7 +232,7 @@ void HealthMonitor::decide(TimeNs t_ns) {
     health_.onset_ns[i] = fault.onset_ns();
   }
   // Wheels that fit again have the time to be known as sound.
-  const double granted = fresh && wheels_fit(last_.statistics) ? 1e-9 * FaultState::kSoundAfter : 0.0;
+  const double granted = wheels_ && fresh && wheels_fit(last_.statistics) ? 1e-9 * FaultState::kSoundAfter : 0.0;
   const bool usable = last_.running && last_.possible && velocity_known() && !life_.contradicted &&
                       seconds_between(life_.aided_ns, t_ns) < kLostAfter + granted;
   const bool proven = !lost() || duration_ns(life_.unproven_ns, t_ns) >= FaultState::kSoundAfter;

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "filter/ekf/initial_state.h"
+#include "filter/ingest/limits.h"
 #include "filter/start/rolling_start.h"
 #include "filter/start/start_fit.h"
 

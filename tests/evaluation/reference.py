@@ -218,8 +218,8 @@ def evaluate(estimate, truth, extra, kind):
     error = p_true - p_est
     angles = [np.linalg.norm(log(x @ y.T)) for x, y in zip(R_true, R_est)]
     s = travelled(t, p_all, times, p_true)
-    known = t[-1] - t[0] - sum(b - a for a, b in gaps(t))
     holes = gaps(t)
+    known = t[-1] - t[0] - sum(b - a for a, b in holes)
     absent = [(t[0], max(t[0], t_est[0])), *gaps(t_est), (min(t[-1], t_est[-1]), t[-1])]
     missed = sum(max(0, min(b, d) - max(a, c)) for a, b in zip(t, t[1:]) if (a, b) not in holes for c, d in absent)
     covered = known - missed

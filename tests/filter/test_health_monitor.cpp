@@ -453,25 +453,26 @@ TEST_CASE("health: wheels that fit again after a slip keep the estimate, before 
   Drive drive;
   drive.frame.image = false;
   drive.go_on(2.0);
-  const auto slip = [&](bool slips) {
-    drive.frame.statistics.wheel_rows_used = slips ? 6 : 15;
-    drive.frame.statistics.wheel_rows_rejected = slips ? 9 : 0;
-    for (const Source wheel : {Source::wheel_left, Source::wheel_right}) {
-      drive.records[index_of(wheel)].used = slips ? 0 : 3;
-      drive.records[index_of(wheel)].rejected = slips ? 3 : 0;
-    }
+  const FrameStatistics fitting = drive.frame.statistics;
+  const Records sound = drive.records;
+  const auto slip = [&] {
+    drive.frame.statistics.wheel_rows_used = 6;
+    drive.frame.statistics.wheel_rows_rejected = 9;
+    drive.reject(Source::wheel_left);
+    drive.reject(Source::wheel_right);
   };
-  slip(true);
+  slip();
   drive.go_on(1.8);
   CHECK(drive.health().aiding == Aiding::none);
   CHECK(drive.health().status == HealthStatus::degraded);
-  slip(false);
+  drive.frame.statistics = fitting;
+  drive.records = sound;
   for (int i = 0; i < 8; ++i) {
     drive.go_on(0.05);
     CHECK(drive.health().status == HealthStatus::degraded);
     CHECK(drive.health().faulty[index_of(Source::wheel_left)]);
   }
-  slip(true);
+  slip();
   drive.go_on(2.2);
   CHECK(drive.health().status == HealthStatus::lost);
 }

@@ -166,7 +166,7 @@ TEST_CASE("single camera start: the noise of the path is that of many integratio
     const std::vector<StartMoment> noisy = start_moments(times, x, samples(1.0));
     Eigen::VectorXd e(12);
     for (std::size_t k = 1; k < times.size(); ++k) {
-      auto errors = e.segment<StartMoment::errors>(StartMoment::errors * static_cast<Eigen::Index>(k - 1));
+      auto errors = e.segment<StartMoment::errors>(StartMoment::errors_before(k));
       errors.head<3>() = log_so3(noisy[k].sums.R * exact[k].sums.R.transpose());
       errors.tail<3>() = noisy[k].position(x) - exact[k].position(x);
     }

@@ -34,12 +34,6 @@ std::vector<Interval> runs(const Trajectory& trajectory) {
   return result;
 }
 
-TimeNs known_time_ns(const Trajectory& trajectory) {
-  TimeNs known = 0;
-  for (const Interval& run : runs(trajectory)) known += run.length();
-  return known;
-}
-
 }  // namespace
 
 TimeNs gap_limit(const Trajectory& trajectory) {
@@ -82,14 +76,18 @@ Association associate(const Trajectory& estimate, const Trajectory& truth) {
   return result;
 }
 
-double known_time(const Trajectory& trajectory) { return 1e-9 * static_cast<double>(known_time_ns(trajectory)); }
+double known_time(const Trajectory& trajectory) {
+  TimeNs known = 0;
+  for (const Interval& run : runs(trajectory)) known += run.length();
+  return 1e-9 * static_cast<double>(known);
+}
 
 double coverage(const Trajectory& estimate, const Trajectory& truth) {
-  const TimeNs known = known_time_ns(truth);
   const std::vector<Interval> estimated = runs(estimate);
-  TimeNs covered = 0;
+  TimeNs known = 0, covered = 0;
   auto first = estimated.begin();
   for (const Interval& run : runs(truth)) {
+    known += run.length();
     while (first != estimated.end() && first->to_ns <= run.from_ns) ++first;
     for (auto it = first; it != estimated.end() && it->from_ns < run.to_ns; ++it)
       covered += Interval{std::max(it->from_ns, run.from_ns), std::min(it->to_ns, run.to_ns)}.length();
