@@ -209,10 +209,6 @@ std::optional<RelativeMotion> CommonEstimator::motion_to(TimeNs t_ns) const {
     return motion_between(*before, nav_state(integrate_to(to_ns, ekf_.state().imu, ingest_.imu())));
   }
   RelativeMotion motion;
-  if (const std::optional<Eigen::Vector3d> path = start_.path_to(to_ns)) {
-    motion.p_B0B1 = *path;
-    motion.translation_known = true;
-  }
   const TimeNs from_ns = imu_time(last->t_ns, camera);
   motion.R_B1B0 = gyro_rotation(from_ns, to_ns, Eigen::Vector3d::Zero(), ingest_.imu()).transpose();
   return motion;

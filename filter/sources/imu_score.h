@@ -1,5 +1,5 @@
 // How noisy the inertial sensors are: at rest by their samples alone, in motion by what they measure between two images
-// of two cameras against what these show, or by the start of one camera in motion. Vibration, missing samples and wrong
+// of two cameras against what these show, and before that by the images of the start. Vibration, missing samples and wrong
 // stamps make them noisier than their data sheet. docs/filter.md, "Propagation".
 #pragma once
 

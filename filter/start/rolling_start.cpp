@@ -27,9 +27,9 @@ Reason lacking_for_rolling_start(const ImuBuffer& imu, const Ring<WheelIncrement
 }
 
 StartAttempt rolling_start(const ImuBuffer& imu, const Ring<WheelIncrement>& turns, const OdometerState& odometer,
-                           const PriorConfig& prior, double stamp_sigma) {
+                           const StartFit::Vector& prior_sigma, double stamp_sigma) {
   const TimeNs start_ns = turns.front().from_ns;
-  StartFit fit(prior);
+  StartFit fit(prior_sigma);
   StartSums sums;
   TimeNs now_ns = start_ns;
   for (std::size_t k = 0; k < turns.size(); ++k) {

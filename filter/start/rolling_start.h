@@ -20,7 +20,8 @@ namespace ear {
 /// turns contradict the inertial samples, as they do in the air or on slipping wheels. They must be all that
 /// lacking_for_rolling_start() asks for. `stamp_sigma` [s]: of one reading of the wheels.
 [[nodiscard]] StartAttempt rolling_start(const ImuBuffer& imu, const Ring<WheelIncrement>& turns,
-                                         const OdometerState& odometer, const PriorConfig& prior, double stamp_sigma);
+                                         const OdometerState& odometer, const StartFit::Vector& prior_sigma,
+                                         double stamp_sigma);
 
 /// What the readings lack for a rolling start: Reason::none if the turns follow each other up to `now_ns` or shortly
 /// before, span `min_duration` [s], and the inertial samples reach back to the first.

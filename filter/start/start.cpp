@@ -67,8 +67,9 @@ std::optional<StartState> Start::find(const Situation& now, const Ingest& ingest
     const Ring<WheelIncrement>& turns = ingest.waiting_increments();
     lacks = lacking_for_rolling_start(ingest.imu(), turns, now.t_ns, kStartSpan);
     if (lacks == Reason::none) {
-      const StartAttempt attempt = rolling_start(ingest.imu(), turns, odometer_state(calibration_), config_.prior,
-                                                 calibration_.encoder->stamp_sigma);
+      const StartAttempt attempt =
+          rolling_start(ingest.imu(), turns, odometer_state(calibration_), start_sigma(config_.prior, calibration_),
+                        calibration_.encoder->stamp_sigma);
       lacks = attempt.lacks;
       if (attempt.x) start = in_motion(attempt);
     }
@@ -82,7 +83,7 @@ std::optional<StartState> Start::find(const Situation& now, const Ingest& ingest
 std::optional<StartState> Start::moving(const Situation& now, const ImuBuffer& imu) {
   waits_for_ = calibration_.cameras.empty() ? Reason::moves_unseen : Reason::few_frames;
   if (calibration_.cameras.empty() || now.frame.features.empty()) return std::nullopt;
-  moving_.add(now.t_ns, now.frame, imu, camera_state(calibration_));
+  moving_.add(now.t_ns, now.frame, imu);
   if (now.lost && !now.contradicted) return std::nullopt;
   const StartAttempt attempt = moving_.solve(imu, camera_state(calibration_));
   waits_for_ = attempt.lacks;
@@ -117,7 +118,7 @@ MapAlignment Start::begin(const StartState& start, const std::optional<Estimate>
       sources.update(&frame.features, false, advice, ekf, records);
     }
     records.statistics = statistics;
-    if (!last_good && start.residual.size() > 0) ekf.move_origin();  // with one camera
+    if (!last_good) ekf.move_origin();
   }
   forget_frames();
   return alignment;
@@ -173,8 +174,8 @@ std::optional<StartState> Start::standing(TimeNs t_ns, const ImuStatistics& imu)
 }
 
 /// The samples of the fit are used again: it only says where the filter is to be linear, so the velocity is as good as
-/// unknown. With one camera the filter would then learn the length of the path from its own errors of linearisation:
-/// the fit says what it is, with kWorstFit times its standard deviations. dv_B = R^T nu, dg_B = R^T [g]x theta.
+/// unknown. By images the filter would then learn the length of the path from its own errors of linearisation: the fit
+/// says what it is, with kWorstFit times its standard deviations. dv_B = R^T nu, dg_B = R^T [g]x theta.
 StartState Start::in_motion(const StartAttempt& attempt) const {
   StartState start;
   start.x = *attempt.x;

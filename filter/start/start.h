@@ -1,5 +1,5 @@
-// Where the filter begins: as given, standing, rolling, or in motion, with two cameras or one. Each gives a
-// start state, or nothing. docs/filter.md, "Starts".
+// Where the filter begins: as given, standing, rolling, or in motion by its cameras. Each gives a start state, or
+// nothing. docs/filter.md, "Starts".
 #pragma once
 
 #include <Eigen/Core>
@@ -22,10 +22,10 @@ struct StartState {
   ImuState x;
   Eigen::VectorXd sigma;  ///< standard deviations of the whole error vector
   /// Whitened, residual = H e + n, by the inertial part: what the mean samples show of attitude and biases of a vehicle
-  /// that stands, what was given of the velocity, or what the fit of one camera in motion knows. Else no rows.
+  /// that stands, what was given of the velocity, or what the fit to the images of one in motion knows. Else no rows.
   Eigen::Matrix<double, Eigen::Dynamic, err::imu_size> H;
   Eigen::VectorXd residual;
-  std::optional<ImuNoiseFactors> imu_noise;  ///< on the stated noise, as one camera in motion shows it
+  std::optional<ImuNoiseFactors> imu_noise;  ///< on the stated noise, as the images of one in motion show it
   bool from_frames = false;  ///< in motion, at the first of the frames kept: all of them are to be taken in
   std::optional<MapAlignment> alignment;  ///< where it was given
 };
@@ -61,8 +61,6 @@ class Start {
   MapAlignment begin(const StartState& start, const std::optional<Estimate>& last_good, const Advice& advice,
                      Ingest& ingest, Ekf& ekf, Sources& sources, Records& records);
 
-  /// How far the body goes from the last frame to `t_ns` (IMU time), in the body as it was then, if that is known [m].
-  [[nodiscard]] std::optional<Eigen::Vector3d> path_to(TimeNs t_ns) const { return moving_.path_to(t_ns); }
   /// Nothing but the wheels' calibration gives a length: there is neither camera nor laser.
   [[nodiscard]] bool scale_is_given() const;
 

@@ -4,6 +4,8 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
+#include "filter/ekf/initial_state.h"
+
 namespace ear {
 namespace {
 
@@ -11,11 +13,22 @@ constexpr double kSizeSigma = 0.01;  // [m/s^2] chosen: of gravity's known size
 
 }  // namespace
 
-StartFit::StartFit(const PriorConfig& prior, const Vector& x) {
-  Vector sigma;
-  sigma << Eigen::Matrix<double, 6, 1>::Constant(HUGE_VAL), Eigen::Vector3d::Constant(prior.gyro_bias),
-      Eigen::Vector3d::Constant(prior.accel_bias), Eigen::Vector3d::Constant(prior.camera_rotation), prior.time_offset;
-  prior_information_ = sigma.array().square().inverse();
+StartFit::Vector start_sigma(const PriorConfig& prior, const Calibration& calibration) {
+  StartFit::Vector sigma = StartFit::Vector::Constant(HUGE_VAL);
+  sigma.segment<3>(StartFit::gyro_bias).setConstant(prior.gyro_bias);
+  sigma.segment<3>(StartFit::accel_bias).setConstant(prior.accel_bias);
+  sigma.segment<3>(StartFit::camera_rotation).setConstant(prior.camera_rotation);
+  sigma(StartFit::time_offset) = prior.time_offset;
+  sigma.segment<3>(StartFit::stereo_rotation).setConstant(prior.stereo_rotation);
+  sigma.tail<6>().setOnes();  // of a camera that is not there
+  for (std::size_t i = 0; i < calibration.cameras.size(); ++i) {
+    sigma.segment<3>(StartFit::lens_of(static_cast<int>(i))) = lens_sigma(prior, calibration.cameras[i]);
+  }
+  return sigma;
+}
+
+StartFit::StartFit(const Vector& prior_sigma, const Vector& x) {
+  prior_information_ = prior_sigma.array().square().inverse();
   A_ = prior_information_.asDiagonal();
   b_ = -prior_information_.cwiseProduct(x);
 }

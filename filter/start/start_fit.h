@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <optional>
 
+#include "ear/calibration.h"
 #include "ear/filter_config.h"
 #include "ear/health.h"
 #include "ear/types.h"
@@ -18,20 +19,22 @@ namespace ear {
 inline constexpr double kWorstFit = 2.0;
 
 /// Unknowns: velocity [m/s], gravity [m/s^2], biases of gyroscope [rad/s] and accelerometer [m/s^2], in the body of the
-/// first moment; then what a camera's calibration is wrong by, where one shows the motion: a turn, R_BC = Exp(phi) R^
-/// [rad], and the time offset [s].
+/// first moment; then what the cameras' calibration is wrong by, where they show the motion: a turn of the left one,
+/// R_BC = Exp(phi) R^ [rad], the time offset [s], a turn of the right one in the left one [rad],
+/// and each one's LensError.
 class StartFit {
  public:
   static constexpr int velocity = 0, gravity = 3, gyro_bias = 6, accel_bias = 9;  ///< where they begin
   static constexpr int motion_size = 12;                                          ///< of these
-  static constexpr int camera_rotation = 12, time_offset = 15, size = 16;
+  static constexpr int camera_rotation = 12, time_offset = 15, stereo_rotation = 16, size = 25;
+  static constexpr int lens_of(int camera) { return 19 + 3 * camera; }
   using Vector = Eigen::Matrix<double, size, 1>;
   using Matrix = Eigen::Matrix<double, size, size>;
   using MotionMatrix = Eigen::Matrix<double, motion_size, motion_size>;
   using Rows = Eigen::Matrix<double, 3, size>;
 
-  /// Biases and calibration are zero, to within the prior. `x`: where what is added is linearized.
-  explicit StartFit(const PriorConfig& prior, const Vector& x = Vector::Zero());
+  /// Biases and calibration are zero, to within `prior_sigma`. `x`: where what is added is linearized.
+  explicit StartFit(const Vector& prior_sigma, const Vector& x = Vector::Zero());
   /// z = H x + n; `variance` of each n.
   void add(const Rows& H, const Eigen::Vector3d& z, double variance) {
     add(H.transpose() * H / variance, H.transpose() * z / variance);
@@ -53,9 +56,11 @@ class StartFit {
   /// The inverse of the covariance, likewise: of all, and of the motion alone.
   [[nodiscard]] Matrix information(const Vector& x) const;
   [[nodiscard]] MotionMatrix motion_information(const Vector& x) const;
-  /// Are biases and calibration within so many standard deviations of the prior?
+  /// Are the biases, and what is known of the left camera's place and time, within so many standard deviations of the
+  /// prior?
   [[nodiscard]] bool expected(const Vector& x, double sigmas) const {
-    return (x.array().square() * prior_information_.array()).maxCoeff() <= sigmas * sigmas;
+    const Vector squares = x.array().square() * prior_information_.array();
+    return squares.head<stereo_rotation>().maxCoeff() <= sigmas * sigmas;
   }
 
  private:
@@ -67,6 +72,9 @@ class StartFit {
   double cost_ = 0.0;
   double rows_ = 0.0;
 };
+
+/// What is known of the unknowns before, as standard deviations: nothing of velocity and gravity.
+[[nodiscard]] StartFit::Vector start_sigma(const PriorConfig& prior, const Calibration& calibration);
 
 /// Of a start in motion: a state to linearize at, or what it lacks.
 struct StartAttempt {

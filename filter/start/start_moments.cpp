@@ -13,9 +13,12 @@ Eigen::Vector3d StartMoment::position(const StartFit::Vector& x) const {
 }
 
 StartFit::Rows StartMoment::position_by_state() const {
-  StartFit::Rows J;
-  J << t * Eigen::Matrix3d::Identity(), 0.5 * t * t * Eigen::Matrix3d::Identity(), sums.position_by_b_g,
-      sums.position_by_b_a, Eigen::Matrix3d::Zero(), position_by_offset;
+  StartFit::Rows J = StartFit::Rows::Zero();
+  J.middleCols<3>(StartFit::velocity) = t * Eigen::Matrix3d::Identity();
+  J.middleCols<3>(StartFit::gravity) = 0.5 * t * t * Eigen::Matrix3d::Identity();
+  J.middleCols<3>(StartFit::gyro_bias) = sums.position_by_b_g;
+  J.middleCols<3>(StartFit::accel_bias) = sums.position_by_b_a;
+  J.col(StartFit::time_offset) = position_by_offset;
   return J;
 }
 
@@ -47,21 +50,28 @@ std::vector<StartMoment> start_moments(const std::vector<TimeNs>& times, const S
 }
 
 PointImage image_of(const Eigen::Vector3d& point, const StartFit::Vector& x, const StartMoment& moment,
-                    const Pose& T_BC) {
+                    const CameraState& cameras, int camera) {
+  const Pose& T_BC = cameras.T_BC0;
   const Eigen::Matrix3d R_BC = exp_so3(x.segment<3>(StartFit::camera_rotation)) * T_BC.R;
   const Eigen::Matrix3d R_BkB = moment.sums.R.transpose();  // to the body at this moment
   const double inverse_depth = point.z();
   const Eigen::Vector3d shift = T_BC.p - moment.position(x);
   const Eigen::Vector3d direction = R_BC * point.head<2>().homogeneous();
   const Eigen::Vector3d y = direction + inverse_depth * shift;  // in B, from the body at this moment
-  const Eigen::Vector3d h = R_BC.transpose() * (R_BkB * y - inverse_depth * T_BC.p);
+  const Eigen::Vector3d h_C0 = R_BC.transpose() * (R_BkB * y - inverse_depth * T_BC.p);
+  const Eigen::Matrix3d R_C0C1 = exp_so3(x.segment<3>(StartFit::stereo_rotation)) * cameras.T_C0C1.R;
+  const Eigen::Vector3d from_C1_C0 = h_C0 - inverse_depth * cameras.T_C0C1.p;
+  const Eigen::Vector3d h = camera == 0 ? h_C0 : Eigen::Vector3d(R_C0C1.transpose() * from_C1_C0);
   PointImage image;
   image.depth = h.z();
-  image.uv = h.head<2>() / h.z();
+  const Eigen::Vector2d uv = h.hnormalized();
+  const Eigen::Vector3d lens = x.segment<3>(StartFit::lens_of(camera));
+  image.uv = LensError{lens(0), lens.tail<2>()}.measured(uv);
   Eigen::Matrix<double, 2, 3> by_h;
-  by_h << Eigen::Matrix2d::Identity(), -image.uv;
-  by_h /= h.z();
-  const Eigen::Matrix<double, 2, 3> by_body = by_h * R_BC.transpose();
+  by_h << Eigen::Matrix2d::Identity(), -uv;
+  by_h *= (1.0 + lens(0)) / h.z();
+  const Eigen::Matrix<double, 2, 3> by_C0 = camera == 0 ? by_h : Eigen::Matrix<double, 2, 3>(by_h * R_C0C1.transpose());
+  const Eigen::Matrix<double, 2, 3> by_body = by_C0 * R_BC.transpose();
   image.by_point << by_body * R_BkB * R_BC.leftCols<2>(), by_body * (R_BkB * shift - T_BC.p);
   image.by_position = -inverse_depth * by_body * R_BkB;
   image.by_state = image.by_position * moment.position_by_state();
@@ -70,6 +80,11 @@ PointImage image_of(const Eigen::Vector3d& point, const StartFit::Vector& x, con
   image.by_state.col(StartFit::time_offset) += image.by_turn * moment.turn_by_offset;
   image.by_state.middleCols<3>(StartFit::camera_rotation) +=
       by_body * (skew(R_BkB * y) - R_BkB * skew(direction) - inverse_depth * skew(T_BC.p));
+  image.by_state.middleCols<3>(StartFit::lens_of(camera)) << uv, Eigen::Matrix2d::Identity();
+  if (camera == 1) {
+    image.by_point.col(2) -= by_C0 * cameras.T_C0C1.p;
+    image.by_state.middleCols<3>(StartFit::stereo_rotation) = by_C0 * skew(from_C1_C0);
+  }
   return image;
 }
 

@@ -1,5 +1,5 @@
-// How a vehicle with one camera moves during its start: the moments of its frames by the inertial samples, what their
-// noise adds up to, and where a point is seen. For single_camera_start.h.
+// How a vehicle with cameras moves during its start: the moments of its frames by the inertial samples, what their
+// noise adds up to, and where a point is seen. For image_start.h.
 #pragma once
 
 #include <Eigen/Core>
@@ -46,7 +46,7 @@ struct StartMoment {
 [[nodiscard]] Eigen::MatrixXd path_noise(const std::vector<TimeNs>& times, const StartFit::Vector& x,
                                          const ImuBuffer& imu, const ImuCalibration& noise);
 
-/// Where the camera sees a point, normalized, and the derivatives.
+/// Where a camera sees a point, normalized, and the derivatives.
 struct PointImage {
   double depth = 0.0;  ///< of the point times its inverse depth; the rest is for those before the camera
   Eigen::Vector2d uv;
@@ -54,9 +54,9 @@ struct PointImage {
   Eigen::Matrix<double, 2, StartFit::size> by_state;
   Eigen::Matrix<double, 2, 3> by_turn, by_position;  ///< of the body, in B
 };
-/// `point`: its direction (alpha, beta, 1) and its inverse depth [1/m] in the camera at the first moment, as (alpha,
-/// beta, inverse depth). `T_BC`: as calibrated, without what x has of it.
+/// `point`: its direction (alpha, beta, 1) and its inverse depth [1/m] in the left camera at the first moment, as
+/// (alpha, beta, inverse depth). `cameras`: as calibrated, without what x has of it; `camera`: 0 left, 1 right.
 [[nodiscard]] PointImage image_of(const Eigen::Vector3d& point, const StartFit::Vector& x, const StartMoment& moment,
-                                  const Pose& T_BC);
+                                  const CameraState& cameras, int camera);
 
 }  // namespace ear

@@ -11,6 +11,8 @@ using namespace ear;
 
 namespace {
 
+const StartFit::Vector kPrior = start_sigma(PriorConfig{}, Calibration{});
+
 /// Two seconds of a simulated drive, from `from` seconds on.
 struct Window {
   ImuBuffer imu{4096};
@@ -61,7 +63,7 @@ TEST_CASE("rolling start: tilt, speed and direction of a vehicle that drives") {
       const simulator::Simulation simulation = drive(sequence, 821);
       const Window window(simulation, from);
       CHECK(lacking_for_rolling_start(window.imu, window.turns, window.end_ns, 1.5) == Reason::none);
-      const auto state = rolling_start(window.imu, window.turns, window.odometer, PriorConfig{}, 0.0).x;
+      const auto state = rolling_start(window.imu, window.turns, window.odometer, kPrior, 0.0).x;
       REQUIRE(state);
       CHECK(state->t_ns == window.start_ns);
       const simulator::Truth truth = simulation.truth(state->t_ns);
@@ -88,7 +90,7 @@ TEST_CASE("rolling start: encoders at 50, 10 and 5 Hz, and at 10 Hz with stamps 
       const Window window(simulation, from, rate.every, rate.jitter);
       CHECK(lacking_for_rolling_start(window.imu, window.turns, window.end_ns, 1.5) == Reason::none);
       const auto state =
-          rolling_start(window.imu, window.turns, window.odometer, PriorConfig{}, rate.jitter / std::sqrt(3.0)).x;
+          rolling_start(window.imu, window.turns, window.odometer, kPrior, rate.jitter / std::sqrt(3.0)).x;
       REQUIRE(state);
       const simulator::Truth truth = simulation.truth(state->t_ns);
       CHECK((state->R_WB.transpose() * Eigen::Vector3d::UnitZ() - truth.R_WB.transpose() * Eigen::Vector3d::UnitZ())
@@ -123,5 +125,5 @@ TEST_CASE("rolling start: not in the air or on slipping wheels") {
     turn.angle *= 1.0 + 2.0 * std::sin(0.3 * static_cast<double>(i));
     contradicting.push(turn);
   }
-  CHECK_FALSE(rolling_start(window.imu, contradicting, window.odometer, PriorConfig{}, 0.0).x);
+  CHECK_FALSE(rolling_start(window.imu, contradicting, window.odometer, kPrior, 0.0).x);
 }

@@ -1,4 +1,4 @@
-#include "filter/start/single_camera_start.h"
+#include "filter/start/image_start.h"
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
@@ -22,29 +22,34 @@ namespace {
 
 constexpr std::size_t kMoments = 12;  // chosen: frames that are used, evenly spaced
 constexpr int kIterations = 20;       // chosen
-constexpr double kKnownLength = 0.1;  // chosen: share of the path to which its length must be known
+constexpr double kKnownLength = 0.1;  // chosen: share of the path to which its length must be known,
+constexpr double kKnownPath = 0.02;   // [m] chosen: or to this, where the vehicle hardly moves
 
 struct Sight {
   std::size_t moment;
+  int camera;
   Eigen::Vector2d uv;
 };
 struct Point {
-  std::vector<Sight> sights;
+  std::vector<Sight> sights;                        // in the order of time
   Eigen::Vector3d value = Eigen::Vector3d::Zero();  // as image_of() takes it
   bool in_front = true;
 };
 
 /// The points that enough of the frames see.
-std::vector<Point> points_of(const std::vector<SeenFrame>& frames, const LensError& lens) {
+std::vector<Point> points_of(const std::vector<SeenFrame>& frames) {
   std::map<std::uint64_t, Point> by_id;
   for (std::size_t k = 0; k < frames.size(); ++k) {
     for (const FeatureObservation& o : frames[k].features->features) {
-      by_id[o.id].sights.push_back({k, lens.corrected(o.left)});
+      std::vector<Sight>& sights = by_id[o.id].sights;
+      sights.push_back({k, 0, o.left});
+      if (o.has_right) sights.push_back({k, 1, o.right});
     }
   }
   std::vector<Point> points;
   for (auto& [id, point] : by_id) {
-    if (point.sights.size() > kConfirmed) points.push_back(std::move(point));
+    const std::size_t frames_between = point.sights.back().moment - point.sights.front().moment;
+    if (frames_between >= kConfirmed) points.push_back(std::move(point));
   }
   return points;
 }
@@ -85,15 +90,15 @@ struct SharedSums {
 
 class Problem {
  public:
-  Problem(const std::vector<SeenFrame>& frames, const ImuBuffer& imu, const CameraState& camera,
+  Problem(const std::vector<SeenFrame>& frames, const ImuBuffer& imu, const CameraState& cameras,
           const StartNoise& noise)
       : imu_(imu),
-        T_BC_(camera.T_BC0),
+        cameras_(cameras),
         noise_(noise),
-        points_(points_of(frames, camera.lens_error[0])),
+        points_(points_of(frames)),
         sums_(points_.size()),
         errors_(Eigen::VectorXd::Zero(StartMoment::errors_before(frames.size()))),
-        fit_(noise.prior) {
+        fit_(noise.prior_sigma) {
     for (const SeenFrame& frame : frames) times_.push_back(frame.t_ns);
   }
 
@@ -126,7 +131,7 @@ class Problem {
   void integrate();
 
   const ImuBuffer& imu_;
-  Pose T_BC_;
+  const CameraState& cameras_;
   const StartNoise& noise_;
   std::vector<TimeNs> times_;
   std::vector<Point> points_;
@@ -151,7 +156,7 @@ void Problem::integrate() {
 
 /// Two rays to a point and the way between their frames lie in one plane, however far the point is. Gauss-Newton.
 void Problem::find_gyro_bias() {
-  const double prior = 1.0 / (noise_.prior.gyro_bias * noise_.prior.gyro_bias);
+  const double prior = std::pow(noise_.prior_sigma(StartFit::gyro_bias), -2);
   auto b_g = x_.segment<3>(StartFit::gyro_bias);
   for (int i = 0; i < kIterations; ++i) {
     integrate();
@@ -164,20 +169,24 @@ void Problem::find_gyro_bias() {
   }
 }
 
-/// Frames k - 1 and k; the camera is as calibrated yet. The way is the direction most nearly perpendicular to all
-/// normals.
+/// Left images of frames k - 1 and k; the camera is as calibrated yet. The way is the direction most nearly
+/// perpendicular to all normals.
 void Problem::add_turn(std::size_t k, Eigen::Matrix3d& A, Eigen::Vector3d& b) const {
   const auto ray = [&](const Sight& sight) {
-    return Eigen::Vector3d(moments_[sight.moment].sums.R * (T_BC_.R * sight.uv.homogeneous().normalized()));
+    return Eigen::Vector3d(moments_[sight.moment].sums.R * (cameras_.T_BC0.R * sight.uv.homogeneous().normalized()));
   };
   std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> rays;
   Eigen::Matrix3d normals = Eigen::Matrix3d::Zero();
   for (const Point& point : points_) {
-    for (std::size_t j = 1; j < point.sights.size(); ++j) {
-      if (point.sights[j - 1].moment != k - 1 || point.sights[j].moment != k) continue;
-      rays.emplace_back(ray(point.sights[j - 1]), ray(point.sights[j]));
-      const Eigen::Vector3d n = rays.back().first.cross(rays.back().second);
-      normals += n * n.transpose();
+    const Sight* from = nullptr;
+    for (const Sight& to : point.sights) {
+      if (to.camera != 0) continue;
+      if (from != nullptr && from->moment == k - 1 && to.moment == k) {
+        rays.emplace_back(ray(*from), ray(to));
+        const Eigen::Vector3d n = rays.back().first.cross(rays.back().second);
+        normals += n * n.transpose();
+      }
+      from = &to;
     }
   }
   const Eigen::Vector3d way = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(normals).eigenvectors().col(0);
@@ -202,11 +211,12 @@ void Problem::guess() {
     sums.clear(StartFit::size);
     for (const Sight& sight : points_[i].sights) {
       const StartMoment& k = moments_[sight.moment];
-      const Eigen::Matrix3d R_CB = (k.sums.R * T_BC_.R).transpose();
+      const Pose T_BC = sight.camera == 0 ? cameras_.T_BC0 : cameras_.T_BC0 * cameras_.T_C0C1;
+      const Eigen::Matrix3d R_CB = (k.sums.R * T_BC.R).transpose();
       const Eigen::Matrix<double, 2, 3> J = R_CB.topRows<2>() - sight.uv * R_CB.row(2);
       Eigen::Matrix<double, 2, StartFit::size> J_x = -J * k.position_by_state();
       J_x.middleCols<3>(StartFit::gyro_bias).setZero();
-      const Eigen::Vector2d r = J * (k.sums.position + k.sums.R * T_BC_.p);
+      const Eigen::Vector2d r = J * (k.sums.position + k.sums.R * T_BC.p);
       sums.A += J.transpose() * J;
       sums.b += J.transpose() * r;
       sums.A_others += J_x.transpose() * J;
@@ -216,12 +226,12 @@ void Problem::guess() {
     shared.eliminate(sums);
   }
   const double weight = 1.0 / (noise_.feature_sigma * noise_.feature_sigma);
-  StartFit fit(noise_.prior);
+  StartFit fit(noise_.prior_sigma);
   fit.add(weight * shared.A, weight * shared.b);
   const StartFit::Vector step = fit.solution();
   x_ += step;
   for (std::size_t i = 0; i < points_.size(); ++i) {
-    const Eigen::Vector3d h = T_BC_.R.transpose() * (sums_[i].step(step) - T_BC_.p);
+    const Eigen::Vector3d h = cameras_.T_BC0.R.transpose() * (sums_[i].step(step) - cameras_.T_BC0.p);
     points_[i].value << h.head<2>() / h.z(), 1.0 / h.z();
     points_[i].in_front = h.allFinite() && h.z() > kLeastDepth;
   }
@@ -238,7 +248,7 @@ double Problem::iterate() {
     sums.clear(shared.b.size());
     images_.clear();
     for (const Sight& sight : point.sights) {
-      images_.push_back(image_of(point.value, x_, moments_[sight.moment], T_BC_));
+      images_.push_back(image_of(point.value, x_, moments_[sight.moment], cameras_, sight.camera));
       point.in_front = point.in_front && images_.back().depth > kLeastDepth;
     }
     if (!point.in_front) continue;
@@ -272,7 +282,7 @@ double Problem::iterate() {
   const Eigen::VectorXd b_e = shared.b.tail(m) - W * errors_;
   const Eigen::LDLT<Eigen::MatrixXd> of_A_e(A_e);
   const Eigen::MatrixXd by_state = of_A_e.solve(A_ex);
-  fit_ = StartFit(noise_.prior, x_);
+  fit_ = StartFit(noise_.prior_sigma, x_);
   fit_.add(shared.A.topLeftCorner<n, n>() - A_ex.transpose() * by_state,
            shared.b.head<n>() - A_ex.transpose() * of_A_e.solve(b_e));
   Eigen::VectorXd step(n + m);
@@ -308,7 +318,7 @@ bool Problem::fits() const {
   for (const Point& point : points_) {
     double worst = 0.0;
     for (const Sight& sight : point.sights) {
-      const PointImage image = image_of(point.value, x_, moments_[sight.moment], T_BC_);
+      const PointImage image = image_of(point.value, x_, moments_[sight.moment], cameras_, sight.camera);
       const double r = image.depth > kLeastDepth ? (sight.uv - image.uv).norm() / noise_.feature_sigma : HUGE_VAL;
       worst = std::max(worst, r);
       squares += std::pow(std::min(r, kClear), 2);
@@ -328,18 +338,18 @@ bool Problem::shows_length() const {
   const StartMoment& farthest = *std::max_element(moments_.begin(), moments_.end(), before);
   const Eigen::Vector3d p = farthest.position(x_);
   const StartFit::Vector J = farthest.position_by_state().transpose() * p.normalized();
-  return J.dot(fit_.information(x_).ldlt().solve(J)) < std::pow(kKnownLength * p.norm(), 2);
+  return J.dot(fit_.information(x_).ldlt().solve(J)) < std::pow(std::max(kKnownPath, kKnownLength * p.norm()), 2);
 }
 
 }  // namespace
 
-StartAttempt single_camera_start(const std::vector<SeenFrame>& frames, const ImuBuffer& imu, const CameraState& camera,
-                                 const StartNoise& noise) {
+StartAttempt image_start(const std::vector<SeenFrame>& frames, const ImuBuffer& imu, const CameraState& cameras,
+                         const StartNoise& noise) {
   std::vector<SeenFrame> used;
   const std::size_t count = std::min(kMoments, frames.size());
   for (std::size_t k = 0; k < count && count > 1; ++k) used.push_back(frames[k * (frames.size() - 1) / (count - 1)]);
   if (used.size() <= kConfirmed) return {std::nullopt, Reason::few_frames};
-  return Problem(used, imu, camera, noise).solve();
+  return Problem(used, imu, cameras, noise).solve();
 }
 
 }  // namespace ear

@@ -1,4 +1,4 @@
-#include "filter/start/single_camera_start.h"
+#include "filter/start/image_start.h"
 
 #include <doctest/doctest.h>
 
@@ -40,16 +40,16 @@ StartSums sums(const Eigen::Vector3d& b_g, const Eigen::Vector3d& b_a) {
   return moment(x).sums;
 }
 
-/// One and a half seconds of a simulation, as one camera sees them.
+/// One and a half seconds of a simulation, as its left camera sees them, or both.
 struct Clip {
   std::vector<FeatureFrame> features;
   std::vector<SeenFrame> frames;
   ImuBuffer imu{4096};
-  CameraState camera;
+  CameraState cameras;
   StartNoise noise;
 
   template <typename ChangeSample>
-  Clip(const simulator::Simulation& simulation, double from, const ChangeSample& change) {
+  Clip(const simulator::Simulation& simulation, double from, const ChangeSample& change, bool stereo = false) {
     const TimeNs begin_ns = simulation.imu().front().t_ns + static_cast<TimeNs>(1e9 * from);
     const TimeNs end_ns = begin_ns + 1'500'000'000;
     for (ImuSample sample : simulation.imu()) {
@@ -57,20 +57,24 @@ struct Clip {
       change(sample);
       imu.push(sample);
     }
-    const Eigen::Isometry3d& T_BC = simulation.calibration().cameras[0].T_BC;
-    camera.T_BC0 = {T_BC.linear(), T_BC.translation()};
-    noise = {PriorConfig{}, simulation.calibration().imu, kSigma};
+    const Calibration& calibration = simulation.calibration();
+    const Eigen::Isometry3d& T_BC0 = calibration.cameras[0].T_BC;
+    const Eigen::Isometry3d T_C0C1 = T_BC0.inverse() * calibration.cameras[1].T_BC;
+    cameras.T_BC0 = {T_BC0.linear(), T_BC0.translation()};
+    cameras.T_C0C1 = {T_C0C1.linear(), T_C0C1.translation()};
+    noise = {start_sigma(PriorConfig{}, calibration), calibration.imu, kSigma};
     std::vector<TimeNs> times;
     for (std::size_t i = 0; i < simulation.frame_times().size(); ++i) {
       const TimeNs t_ns = simulation.frame_times()[i];
       if (t_ns < begin_ns || t_ns > end_ns) continue;
       features.push_back(simulation.tracks(i));
+      for (FeatureObservation& o : features.back().features) o.has_right = o.has_right && stereo;
       times.push_back(t_ns);
     }
     for (std::size_t i = 0; i < times.size(); ++i) frames.push_back({times[i], &features[i]});
   }
 
-  [[nodiscard]] StartAttempt start() const { return single_camera_start(frames, imu, camera, noise); }
+  [[nodiscard]] StartAttempt start() const { return image_start(frames, imu, cameras, noise); }
 };
 
 simulator::Simulation fly(double rate_hz, std::uint64_t seed, double calibration_error) {
@@ -102,36 +106,43 @@ TEST_CASE("start sums: the derivatives by the biases are those of the sums") {
   }
 }
 
-TEST_CASE("single camera start: the derivatives of a point's image are those of the image") {
-  const Pose T_BC = {exp_so3(Eigen::Vector3d(0.3, -0.9, 0.4)), Eigen::Vector3d(0.1, 0.02, -0.05)};
+TEST_CASE("image start: the derivatives of a point's image are those of the image") {
+  CameraState cameras;
+  cameras.T_BC0 = {exp_so3(Eigen::Vector3d(0.3, -0.9, 0.4)), Eigen::Vector3d(0.1, 0.02, -0.05)};
+  cameras.T_C0C1 = {exp_so3(Eigen::Vector3d(0.05, 0.1, -0.08)), Eigen::Vector3d(0.2, -0.01, 0.03)};
   StartFit::Vector x;
-  x << 0.7, -0.3, 0.2, 0.4, 0.8, -9.7, 0.02, -0.01, 0.03, 0.1, -0.05, 0.08, 0.0, 0.0, 0.0, 3e-3;
+  x << 0.7, -0.3, 0.2, 0.4, 0.8, -9.7, 0.02, -0.01, 0.03, 0.1, -0.05, 0.08, 0.0, 0.0, 0.0, 3e-3, 0.0, 0.0, 0.0, 0.02,
+      -0.01, 0.03, -0.02, 0.02, 0.01;
   const Eigen::Vector3d point(0.2, -0.1, 0.25);
-  const PointImage image = image_of(point, x, moment(x), T_BC);
-  REQUIRE(image.depth > 0.1);
-  constexpr double kStep = 1e-5;
-  for (int i = 0; i < 3; ++i) {
-    const PointImage moved = image_of(point + kStep * Eigen::Vector3d::Unit(i), x, moment(x), T_BC);
-    CHECK(((moved.uv - image.uv) / kStep - image.by_point.col(i)).norm() < 1e-4);
-    StartMoment turned = moment(x), shifted = moment(x);
-    turned.sums.R = exp_so3(kStep * Eigen::Vector3d::Unit(i)) * turned.sums.R;
-    shifted.error(i) += kStep;
-    CHECK(((image_of(point, x, turned, T_BC).uv - image.uv) / kStep - image.by_turn.col(i)).norm() < 1e-4);
-    CHECK(((image_of(point, x, shifted, T_BC).uv - image.uv) / kStep - image.by_position.col(i)).norm() < 1e-4);
-  }
-  for (int i = 0; i < StartFit::size; ++i) {
-    CAPTURE(i);
-    const StartFit::Vector other = x + kStep * StartFit::Vector::Unit(i);
-    const PointImage moved = image_of(point, other, moment(other), T_BC);
-    // The offset's derivative takes the rate and force of a sample, half a millisecond off.
-    const double most = i == StartFit::time_offset ? 1e-2 : 1e-3;
-    CHECK(((moved.uv - image.uv) / kStep - image.by_state.col(i)).norm() < most);
-    const Eigen::Vector3d path = moment(other).position(other) - moment(x).position(x);
-    CHECK((path / kStep - moment(x).position_by_state().col(i)).norm() < most);
+  for (const int camera : {0, 1}) {
+    CAPTURE(camera);
+    const PointImage image = image_of(point, x, moment(x), cameras, camera);
+    REQUIRE(image.depth > 0.1);
+    constexpr double kStep = 1e-5;
+    for (int i = 0; i < 3; ++i) {
+      const PointImage moved = image_of(point + kStep * Eigen::Vector3d::Unit(i), x, moment(x), cameras, camera);
+      CHECK(((moved.uv - image.uv) / kStep - image.by_point.col(i)).norm() < 1e-4);
+      StartMoment turned = moment(x), shifted = moment(x);
+      turned.sums.R = exp_so3(kStep * Eigen::Vector3d::Unit(i)) * turned.sums.R;
+      shifted.error(i) += kStep;
+      CHECK(((image_of(point, x, turned, cameras, camera).uv - image.uv) / kStep - image.by_turn.col(i)).norm() < 1e-4);
+      CHECK(((image_of(point, x, shifted, cameras, camera).uv - image.uv) / kStep - image.by_position.col(i)).norm() <
+            1e-4);
+    }
+    for (int i = 0; i < StartFit::size; ++i) {
+      CAPTURE(i);
+      const StartFit::Vector other = x + kStep * StartFit::Vector::Unit(i);
+      const PointImage moved = image_of(point, other, moment(other), cameras, camera);
+      // The offset's derivative takes the rate and force of a sample, half a millisecond off.
+      const double most = i == StartFit::time_offset ? 1e-2 : 1e-3;
+      CHECK(((moved.uv - image.uv) / kStep - image.by_state.col(i)).norm() < most);
+      const Eigen::Vector3d path = moment(other).position(other) - moment(x).position(x);
+      CHECK((path / kStep - moment(x).position_by_state().col(i)).norm() < most);
+    }
   }
 }
 
-TEST_CASE("single camera start: the noise of the path is that of many integrations") {
+TEST_CASE("image start: the noise of the path is that of many integrations") {
   const ImuCalibration noise = [] {
     ImuCalibration imu;
     imu.gyro_noise = 2e-3;
@@ -178,60 +189,70 @@ TEST_CASE("single camera start: the noise of the path is that of many integratio
   CHECK(scaled.cwiseAbs().maxCoeff() < 0.08);
 }
 
-TEST_CASE("single camera start: velocity, tilt and bias in flight, by a calibration as wrong as real ones are") {
-  int starts = 0, windows = 0;
-  double squares = 0.0;
-  for (const double rate : {30.0, 10.0}) {
-    for (const std::uint64_t seed : {841U, 842U, 843U}) {
-      const simulator::Simulation simulation = fly(rate, seed, 1.0);
-      for (double from = 8.0; from < 22.0; from += 1.0) {
-        CAPTURE(rate);
-        CAPTURE(seed);
-        CAPTURE(from);
-        ++windows;
-        const StartAttempt attempt = Clip(simulation, from, kUnchanged).start();
-        CHECK((attempt.x || attempt.lacks != Reason::none));
-        if (!attempt.x) continue;
-        ++starts;
-        const ImuState& x = *attempt.x;
-        const simulator::Truth truth = simulation.truth(x.t_ns);
-        const Eigen::Vector3d up_B = x.R_WB.transpose() * Eigen::Vector3d::UnitZ();
-        const double tilt = std::acos(std::min(1.0, up_B.dot(truth.R_WB.transpose() * Eigen::Vector3d::UnitZ())));
-        const double v_error = (x.R_WB.transpose() * x.v_W - truth.R_WB.transpose() * truth.v_W).norm();
-        CHECK(tilt < 0.06);
-        CHECK(v_error < 0.05 + 0.3 * truth.v_W.norm());
-        CHECK((x.b_g - truth.b_g).norm() < 0.02);
-        squares += std::pow(v_error / (0.3 + truth.v_W.norm()), 2);
+TEST_CASE("image start: velocity, tilt and bias in flight, by a calibration as wrong as real ones are") {
+  for (const bool stereo : {false, true}) {
+    CAPTURE(stereo);
+    int starts = 0, windows = 0;
+    double squares = 0.0;
+    for (const double rate : {30.0, 10.0}) {
+      for (const std::uint64_t seed : {841U, 842U, 843U}) {
+        const simulator::Simulation simulation = fly(rate, seed, 1.0);
+        for (double from = 8.0; from < 22.0; from += 1.0) {
+          CAPTURE(rate);
+          CAPTURE(seed);
+          CAPTURE(from);
+          ++windows;
+          const StartAttempt attempt = Clip(simulation, from, kUnchanged, stereo).start();
+          CHECK((attempt.x || attempt.lacks != Reason::none));
+          if (!attempt.x) continue;
+          ++starts;
+          const ImuState& x = *attempt.x;
+          const simulator::Truth truth = simulation.truth(x.t_ns);
+          const Eigen::Vector3d up_B = x.R_WB.transpose() * Eigen::Vector3d::UnitZ();
+          const double tilt = std::acos(std::min(1.0, up_B.dot(truth.R_WB.transpose() * Eigen::Vector3d::UnitZ())));
+          const double v_error = (x.R_WB.transpose() * x.v_W - truth.R_WB.transpose() * truth.v_W).norm();
+          CHECK(tilt < 0.06);
+          CHECK(v_error < 0.05 + (stereo ? 0.1 : 0.3) * truth.v_W.norm());
+          CHECK((x.b_g - truth.b_g).norm() < 0.02);
+          squares += std::pow(v_error / (0.3 + truth.v_W.norm()), 2);
+        }
       }
     }
+    const double rms = std::sqrt(squares / starts);
+    MESSAGE((stereo ? 2 : 1), " cameras: ", starts, " of ", windows, " windows of 1.5 s start, the velocity to ", rms);
+    CHECK(starts >= (stereo ? windows : 40));
+    CHECK(rms < (stereo ? 0.03 : 0.07));
   }
-  const double rms = std::sqrt(squares / starts);
-  MESSAGE(starts, " of ", windows, " windows of 1.5 s start, the velocity to ", rms);
-  CHECK(starts >= 40);
-  CHECK(rms < 0.07);
 }
 
-TEST_CASE("single camera start: how noisy the inertial samples are, against what is stated") {
-  const std::vector<ImuNoiseFactors> cases{{1.0, 1.0}, {4.0, 1.0}, {1.0, 5.0}};
+TEST_CASE("image start: how noisy the inertial samples are, against what is stated") {
+  struct Case {
+    ImuNoiseFactors times;
+    bool stereo;
+  };
+  const std::vector<Case> cases{{{1.0, 1.0}, false}, {{4.0, 1.0}, false}, {{1.0, 5.0}, false},
+                                {{1.0, 1.0}, true},  {{4.0, 1.0}, true},  {{1.0, 5.0}, true}};
   std::mt19937_64 rng(7);
   std::normal_distribution<double> normal;
-  for (const ImuNoiseFactors& times : cases) {
+  for (const auto& [times, stereo] : cases) {
+    CAPTURE(stereo);
     CAPTURE(times.gyro);
     CAPTURE(times.accel);
     double gyro = 0.0, accel = 0.0, squares = 0.0;
     int starts = 0;
     for (const std::uint64_t seed : {845U, 846U, 847U}) {
       const simulator::Simulation simulation = fly(30.0, seed, 0.0);
-      for (double from = 8.0; from < 22.0; from += 0.25) {
+      for (double from = 8.0; from < 22.0; from += stereo ? 1.0 : 0.25) {
         const ImuCalibration& imu = simulation.calibration().imu;
         const auto add = [&](Eigen::Vector3d& value, double density, double factor) {
           const double sigma = density * std::sqrt((factor * factor - 1.0) * imu.rate_hz);
           for (double& v : value) v += sigma * normal(rng);
         };
-        const StartAttempt attempt = Clip(simulation, from, [&](ImuSample& sample) {
-                                       add(sample.gyro_B, imu.gyro_noise, times.gyro);
-                                       add(sample.accel_B, imu.accel_noise, times.accel);
-                                     }).start();
+        const auto noisier = [&, &times = times](ImuSample& sample) {
+          add(sample.gyro_B, imu.gyro_noise, times.gyro);
+          add(sample.accel_B, imu.accel_noise, times.accel);
+        };
+        const StartAttempt attempt = Clip(simulation, from, noisier, stereo).start();
         if (!attempt.x) continue;
         ++starts;
         gyro += std::log(attempt.imu_noise.value().gyro);
@@ -243,8 +264,8 @@ TEST_CASE("single camera start: how noisy the inertial samples are, against what
         squares += error.dot(covariance.topLeftCorner<3, 3>().ldlt().solve(error));
       }
     }
-    MESSAGE(times.gyro, ", ", times.accel, " times: measured ", std::exp(gyro / starts), ", ", std::exp(accel / starts),
-            ", ", starts, " starts, NEES of the velocity ", squares / starts);
+    MESSAGE((stereo ? 2 : 1), " cameras, ", times.gyro, ", ", times.accel, " times: measured ", std::exp(gyro / starts),
+            ", ", std::exp(accel / starts), ", ", starts, " starts, NEES of the velocity ", squares / starts);
     CHECK(std::exp(gyro / starts) == test::about(times.gyro, 0.4));
     CHECK(std::exp(accel / starts) == test::about(times.accel, 0.5));
     CHECK(starts >= 25);
@@ -252,7 +273,7 @@ TEST_CASE("single camera start: how noisy the inertial samples are, against what
   }
 }
 
-TEST_CASE("single camera start: no length is shown at a steady speed, and what contradicts itself starts nothing") {
+TEST_CASE("image start: no length is shown at a steady speed, and what contradicts itself starts nothing") {
   simulator::Options options;
   options.sequence = "flat1";
   options.seed = 923;
@@ -270,6 +291,9 @@ TEST_CASE("single camera start: no length is shown at a steady speed, and what c
     unseen += attempt.x ? 0 : 1;
   }
   CHECK(unseen >= 6);
+  const StartAttempt by_two = Clip(steady, 6.0, kUnchanged, true).start();
+  REQUIRE(by_two.x);
+  CHECK(by_two.x->v_W.norm() == test::about(steady.truth(by_two.x->t_ns).v_W.norm(), 0.03));
 
   const simulator::Simulation simulation = fly(30.0, 844, 0.0);
   const auto lacks = [&](const auto& change) { return Clip(simulation, 10.0, change).start().lacks; };
