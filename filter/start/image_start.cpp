@@ -30,13 +30,16 @@ struct Sight {
   int camera;
   Eigen::Vector2d uv;
 };
+bool by_right(const Sight& sight) { return sight.camera == 1; }
+
 struct Point {
   std::vector<Sight> sights;                        // in the order of time
   Eigen::Vector3d value = Eigen::Vector3d::Zero();  // as image_of() takes it
   bool in_front = true;
 };
 
-/// The points that enough of the frames see.
+/// The points that enough of the frames see. Few that the right camera sees, too, may be false matches, which would say
+/// how long the path is: then the left one counts alone.
 std::vector<Point> points_of(const std::vector<SeenFrame>& frames) {
   std::map<std::uint64_t, Point> by_id;
   for (std::size_t k = 0; k < frames.size(); ++k) {
@@ -47,9 +50,16 @@ std::vector<Point> points_of(const std::vector<SeenFrame>& frames) {
     }
   }
   std::vector<Point> points;
+  std::size_t by_both = 0;
   for (auto& [id, point] : by_id) {
     const std::size_t frames_between = point.sights.back().moment - point.sights.front().moment;
-    if (frames_between >= kConfirmed) points.push_back(std::move(point));
+    if (frames_between < kConfirmed) continue;
+    by_both += std::any_of(point.sights.begin(), point.sights.end(), by_right) ? 1 : 0;
+    points.push_back(std::move(point));
+  }
+  for (Point& point : points) {
+    if (by_both >= kToKnow) break;
+    point.sights.erase(std::remove_if(point.sights.begin(), point.sights.end(), by_right), point.sights.end());
   }
   return points;
 }
@@ -310,12 +320,13 @@ void Problem::measure_noise(const Eigen::MatrixXd& W, const Eigen::MatrixXd& cov
   }
 }
 
-/// The images, and what was known before.
+/// The images, and what was known before. Left and right exchanged fit by points that lie behind the cameras.
 bool Problem::fits() const {
   double squares = 0.0;
   double rows = 0.0;
   std::size_t fitting = 0;
-  for (const Point& point : points_) {
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    const Point& point = points_[i];
     double worst = 0.0;
     for (const Sight& sight : point.sights) {
       const PointImage image = image_of(point.value, x_, moments_[sight.moment], cameras_, sight.camera);
@@ -324,7 +335,8 @@ bool Problem::fits() const {
       squares += std::pow(std::min(r, kClear), 2);
       rows += 2.0;
     }
-    fitting += worst < kClear ? 1 : 0;
+    const double inverse_depth = point.value.z() * std::sqrt(sums_[i].A(2, 2));  // in its standard deviations
+    fitting += worst < kClear && inverse_depth > -kClear ? 1 : 0;
   }
   if (!fit_.expected(x_, kClear) || std::max(noisier_[0], noisier_[1]) > ImuScore::kFarthest) return false;
   return squares <= kWorstFit * rows && fitting >= std::max<std::size_t>(kToKnow, points_.size() / 2);

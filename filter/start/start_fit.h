@@ -56,11 +56,10 @@ class StartFit {
   /// The inverse of the covariance, likewise: of all, and of the motion alone.
   [[nodiscard]] Matrix information(const Vector& x) const;
   [[nodiscard]] MotionMatrix motion_information(const Vector& x) const;
-  /// Are the biases, and what is known of the left camera's place and time, within so many standard deviations of the
-  /// prior?
+  /// Are biases and calibration, but for the lenses, within so many standard deviations of the prior?
   [[nodiscard]] bool expected(const Vector& x, double sigmas) const {
     const Vector squares = x.array().square() * prior_information_.array();
-    return squares.head<stereo_rotation>().maxCoeff() <= sigmas * sigmas;
+    return squares.head<lens_of(0)>().maxCoeff() <= sigmas * sigmas;
   }
 
  private:
