@@ -22,8 +22,7 @@ namespace {
 
 constexpr std::size_t kMoments = 12;  // chosen: frames that are used, evenly spaced
 constexpr int kIterations = 20;       // chosen
-constexpr double kKnownLength = 0.1;  // chosen: share of the path to which its length must be known,
-constexpr double kKnownPath = 0.02;   // [m] chosen: or to this, where the vehicle hardly moves
+constexpr double kKnownLength = 0.1;  // chosen: share of the path to which its length must be known, by one camera
 
 struct Sight {
   std::size_t moment;
@@ -342,15 +341,18 @@ bool Problem::fits() const {
   return squares <= kWorstFit * rows && fitting >= std::max<std::size_t>(kToKnow, points_.size() / 2);
 }
 
-/// At the farthest of its positions.
+/// Two cameras show it; one, where it is known at the farthest of the positions.
 bool Problem::shows_length() const {
+  for (const Point& point : points_) {
+    if (std::any_of(point.sights.begin(), point.sights.end(), by_right)) return true;
+  }
   const auto before = [&](const StartMoment& a, const StartMoment& b) {
     return a.position(x_).norm() < b.position(x_).norm();
   };
   const StartMoment& farthest = *std::max_element(moments_.begin(), moments_.end(), before);
   const Eigen::Vector3d p = farthest.position(x_);
   const StartFit::Vector J = farthest.position_by_state().transpose() * p.normalized();
-  return J.dot(fit_.information(x_).ldlt().solve(J)) < std::pow(std::max(kKnownPath, kKnownLength * p.norm()), 2);
+  return J.dot(fit_.information(x_).ldlt().solve(J)) < std::pow(kKnownLength * p.norm(), 2);
 }
 
 }  // namespace
