@@ -305,6 +305,27 @@ TEST_CASE("image start: no length is shown at a steady speed, and what contradic
           std::swap(sample.accel_B.x(), sample.accel_B.y());
           std::swap(sample.gyro_B.x(), sample.gyro_B.y());
         }) != Reason::none);
+
+  Clip exchanged(simulation, 10.0, kUnchanged, true);
+  REQUIRE(exchanged.start().x);
+  for (FeatureFrame& frame : exchanged.features) {
+    for (FeatureObservation& o : frame.features) {
+      if (o.has_right) std::swap(o.left, o.right);
+    }
+  }
+  CHECK_FALSE(exchanged.start().x);
+
+  Clip few_right(simulation, 10.0, kUnchanged, true);
+  for (FeatureFrame& frame : few_right.features) {
+    for (FeatureObservation& o : frame.features) {
+      o.has_right = o.has_right && o.id % 20 == 0;
+      o.right.x() += 0.02;
+    }
+  }
+  const StartAttempt by_left = few_right.start();
+  REQUIRE(by_left.x);
+  CHECK(by_left.x->v_W == Clip(simulation, 10.0, kUnchanged).start().x.value().v_W);
+
   Clip blind(simulation, 10.0, kUnchanged);
   for (FeatureFrame& frame : blind.features) frame.features.resize(5);
   CHECK(blind.start().lacks == Reason::few_frames);
