@@ -315,6 +315,12 @@ TEST_CASE("image start: no length is shown at a steady speed, and what contradic
   }
   CHECK_FALSE(exchanged.start().x);
 
+  Clip bent(simulation, 10.0, kUnchanged, true);
+  bent.cameras.T_C0C1.R = exp_so3(Eigen::Vector3d(2e-3, -2e-3, 2e-3)) * bent.cameras.T_C0C1.R;
+  const StartAttempt by_bent = bent.start();
+  REQUIRE(by_bent.x);
+  CHECK(by_bent.x->v_W.norm() == test::about(simulation.truth(by_bent.x->t_ns).v_W.norm(), 0.05));
+
   Clip few_right(simulation, 10.0, kUnchanged, true);
   for (FeatureFrame& frame : few_right.features) {
     for (FeatureObservation& o : frame.features) {
