@@ -64,7 +64,8 @@ HELD = {
     "kitti_a": Held("a car, stereo 10 Hz, starts at 4 m/s", "kitti_raw",
                     "of the IMU only 16 % of the packets exist, and its samples are 53 ms late against the attitude of the truth, "
                     "which comes from the same device: in the turn at the start that is 1.2 degrees of yaw. From 1.8 to 7 s the truth rises by 1.0 m, "
-                    "by its own vertical velocities by 0.3 m: on the way of 158 m these 0.7 m alone are 0.4 %"),
+                    "by its own vertical velocities by 0.3 m: on the way of 158 m these 0.7 m alone are 0.4 %. Its alarm is true: two images that no "
+                    "inertial samples reach"),
     "comma2k19": Held("a car on a motorway without a camera: wheels and a phone's IMU", "comma2k19",
                       "the odometer's mounting is a guess, and the wheels are 1 % larger than stated"),
     "ucsd_20": Held("a skid-steered robot indoors: wheels and IMU", "ucsd",
