@@ -234,7 +234,9 @@ TEST_CASE("image start: how noisy the inertial samples are, against what is stat
                                 {{1.0, 1.0}, true},  {{4.0, 1.0}, true},  {{1.0, 5.0}, true}};
   std::mt19937_64 rng(7);
   std::normal_distribution<double> normal;
-  for (const auto& [times, stereo] : cases) {
+  for (const Case& one : cases) {
+    const ImuNoiseFactors times = one.times;
+    const bool stereo = one.stereo;
     CAPTURE(stereo);
     CAPTURE(times.gyro);
     CAPTURE(times.accel);
@@ -248,7 +250,7 @@ TEST_CASE("image start: how noisy the inertial samples are, against what is stat
           const double sigma = density * std::sqrt((factor * factor - 1.0) * imu.rate_hz);
           for (double& v : value) v += sigma * normal(rng);
         };
-        const auto noisier = [&, &times = times](ImuSample& sample) {
+        const auto noisier = [&](ImuSample& sample) {
           add(sample.gyro_B, imu.gyro_noise, times.gyro);
           add(sample.accel_B, imu.accel_noise, times.accel);
         };
