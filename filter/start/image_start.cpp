@@ -29,35 +29,33 @@ struct Sight {
   int camera;
   Eigen::Vector2d uv;
 };
-bool by_right(const Sight& sight) { return sight.camera == 1; }
-
 struct Point {
   std::vector<Sight> sights;                        // in the order of time
   Eigen::Vector3d value = Eigen::Vector3d::Zero();  // as image_of() takes it
   bool in_front = true;
 };
 
+bool by_right(const Sight& sight) { return sight.camera == 1; }
+bool by_both(const Point& point) { return std::any_of(point.sights.begin(), point.sights.end(), by_right); }
+
 /// The points that enough of the frames see. Few that the right camera sees, too, may be false matches, which would say
 /// how long the path is: then the left one counts alone.
-std::vector<Point> points_of(const std::vector<SeenFrame>& frames) {
+std::vector<Point> points_of(const std::vector<const TimedFrame*>& frames) {
   std::map<std::uint64_t, Point> by_id;
   for (std::size_t k = 0; k < frames.size(); ++k) {
-    for (const FeatureObservation& o : frames[k].features->features) {
+    for (const FeatureObservation& o : frames[k]->features.features) {
       std::vector<Sight>& sights = by_id[o.id].sights;
       sights.push_back({k, 0, o.left});
       if (o.has_right) sights.push_back({k, 1, o.right});
     }
   }
   std::vector<Point> points;
-  std::size_t by_both = 0;
   for (auto& [id, point] : by_id) {
     const std::size_t frames_between = point.sights.back().moment - point.sights.front().moment;
-    if (frames_between < kConfirmed) continue;
-    by_both += std::any_of(point.sights.begin(), point.sights.end(), by_right) ? 1 : 0;
-    points.push_back(std::move(point));
+    if (frames_between >= kConfirmed) points.push_back(std::move(point));
   }
+  if (std::count_if(points.begin(), points.end(), by_both) >= kToKnow) return points;
   for (Point& point : points) {
-    if (by_both >= kToKnow) break;
     point.sights.erase(std::remove_if(point.sights.begin(), point.sights.end(), by_right), point.sights.end());
   }
   return points;
@@ -99,7 +97,7 @@ struct SharedSums {
 
 class Problem {
  public:
-  Problem(const std::vector<SeenFrame>& frames, const ImuBuffer& imu, const CameraState& cameras,
+  Problem(const std::vector<const TimedFrame*>& frames, const ImuBuffer& imu, const CameraState& cameras,
           const StartNoise& noise)
       : imu_(imu),
         cameras_(cameras),
@@ -108,7 +106,7 @@ class Problem {
         sums_(points_.size()),
         errors_(Eigen::VectorXd::Zero(StartMoment::errors_before(frames.size()))),
         fit_(noise.prior_sigma) {
-    for (const SeenFrame& frame : frames) times_.push_back(frame.t_ns);
+    for (const TimedFrame* frame : frames) times_.push_back(frame->t_ns);
   }
 
   [[nodiscard]] StartAttempt solve() {
@@ -214,13 +212,14 @@ void Problem::add_turn(std::size_t k, Eigen::Matrix3d& A, Eigen::Vector3d& b) co
 /// of a point P (uv h.z - h.xy) = 0, h = R_CB (P - p - R p_BC).
 void Problem::guess() {
   integrate();
+  const std::array<Pose, 2> poses = {cameras_.T_BC0, cameras_.T_BC0 * cameras_.T_C0C1};
   SharedSums shared(StartFit::size);
   for (std::size_t i = 0; i < points_.size(); ++i) {
     PointSums& sums = sums_[i];
     sums.clear(StartFit::size);
     for (const Sight& sight : points_[i].sights) {
       const StartMoment& k = moments_[sight.moment];
-      const Pose T_BC = sight.camera == 0 ? cameras_.T_BC0 : cameras_.T_BC0 * cameras_.T_C0C1;
+      const Pose& T_BC = poses[static_cast<std::size_t>(sight.camera)];
       const Eigen::Matrix3d R_CB = (k.sums.R * T_BC.R).transpose();
       const Eigen::Matrix<double, 2, 3> J = R_CB.topRows<2>() - sight.uv * R_CB.row(2);
       Eigen::Matrix<double, 2, StartFit::size> J_x = -J * k.position_by_state();
@@ -240,7 +239,7 @@ void Problem::guess() {
   const StartFit::Vector step = fit.solution();
   x_ += step;
   for (std::size_t i = 0; i < points_.size(); ++i) {
-    const Eigen::Vector3d h = cameras_.T_BC0.R.transpose() * (sums_[i].step(step) - cameras_.T_BC0.p);
+    const Eigen::Vector3d h = poses[0].R.transpose() * (sums_[i].step(step) - poses[0].p);
     points_[i].value << h.head<2>() / h.z(), 1.0 / h.z();
     points_[i].in_front = h.allFinite() && h.z() > kLeastDepth;
   }
@@ -343,9 +342,7 @@ bool Problem::fits() const {
 
 /// Two cameras show it; one, where it is known at the farthest of the positions.
 bool Problem::shows_length() const {
-  for (const Point& point : points_) {
-    if (std::any_of(point.sights.begin(), point.sights.end(), by_right)) return true;
-  }
+  if (std::any_of(points_.begin(), points_.end(), by_both)) return true;
   const auto before = [&](const StartMoment& a, const StartMoment& b) {
     return a.position(x_).norm() < b.position(x_).norm();
   };
@@ -357,11 +354,11 @@ bool Problem::shows_length() const {
 
 }  // namespace
 
-StartAttempt image_start(const std::vector<SeenFrame>& frames, const ImuBuffer& imu, const CameraState& cameras,
+StartAttempt image_start(const std::vector<TimedFrame>& frames, const ImuBuffer& imu, const CameraState& cameras,
                          const StartNoise& noise) {
-  std::vector<SeenFrame> used;
+  std::vector<const TimedFrame*> used;
   const std::size_t count = std::min(kMoments, frames.size());
-  for (std::size_t k = 0; k < count && count > 1; ++k) used.push_back(frames[k * (frames.size() - 1) / (count - 1)]);
+  for (std::size_t k = 0; k < count && count > 1; ++k) used.push_back(&frames[k * (frames.size() - 1) / (count - 1)]);
   if (used.size() <= kConfirmed) return {std::nullopt, Reason::few_frames};
   return Problem(used, imu, cameras, noise).solve();
 }

@@ -14,16 +14,16 @@
 namespace ear {
 
 /// What the cameras saw at a time of the IMU's clock.
-struct SeenFrame {
+struct TimedFrame {
   TimeNs t_ns = 0;
-  const FeatureFrame* features = nullptr;
+  FeatureFrame features;
 };
 
-/// What is known of the sensors: start_sigma() before, and `feature_sigma` of one observation, normalized.
+/// What is known of the sensors.
 struct StartNoise {
-  StartFit::Vector prior_sigma;
+  StartFit::Vector prior_sigma;  ///< start_sigma()
   ImuCalibration imu;
-  double feature_sigma = 0.0;
+  double feature_sigma = 0.0;  ///< of one observation, normalized
 };
 
 /// A state at the first of the frames. Least squares (Gauss-Newton, Huber) over the velocity v and gravity g of that
@@ -33,7 +33,7 @@ struct StartNoise {
 /// That noise is measured, too, by how far e is from zero, as a factor on what is stated.
 /// It is a point to linearize at, not an estimate: the frames may be used again. It lacks few_frames, or
 /// cameras_contradict where the images do not fit, or moves_unseen where they do not show the length of the path.
-[[nodiscard]] StartAttempt image_start(const std::vector<SeenFrame>& frames, const ImuBuffer& imu,
+[[nodiscard]] StartAttempt image_start(const std::vector<TimedFrame>& frames, const ImuBuffer& imu,
                                        const CameraState& cameras, const StartNoise& noise);
 
 }  // namespace ear

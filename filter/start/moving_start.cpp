@@ -35,9 +35,7 @@ StartAttempt MovingStart::solve(const ImuBuffer& imu, const CameraState& cameras
     return {std::nullopt, lacked_};
   }
   tried_ns_ = now_ns;
-  std::vector<SeenFrame> seen;
-  for (const TimedFrame& frame : frames_) seen.push_back({frame.t_ns, &frame.features});
-  StartAttempt attempt = image_start(seen, imu, cameras, noise_);
+  StartAttempt attempt = image_start(frames_, imu, cameras, noise_);
   lacked_ = attempt.lacks;
   return attempt;
 }

@@ -21,11 +21,6 @@ class MovingStart {
  public:
   MovingStart(const FilterConfig& config, const Calibration& calibration);
 
-  struct TimedFrame {
-    TimeNs t_ns = 0;  ///< IMU time
-    FeatureFrame features;
-  };
-
   /// The next frame, at IMU time `t_ns`. One that repeats the last, or comes long after it, shows no motion: what came
   /// before is forgotten.
   void add(TimeNs t_ns, const FeatureFrame& frame, const ImuBuffer& imu);

@@ -113,7 +113,7 @@ MapAlignment Start::begin(const StartState& start, const std::optional<Estimate>
     ingest.drop_before(start.x.t_ns);
     const FrameStatistics statistics = records.statistics;
     for (std::size_t i = 0; i + 1 < moving_.frames().size(); ++i) {
-      const MovingStart::TimedFrame& frame = moving_.frames()[i];
+      const TimedFrame& frame = moving_.frames()[i];
       sources.advance(frame.t_ns, advice, ingest, ekf, records);
       sources.update(&frame.features, false, advice, ekf, records);
     }

@@ -59,9 +59,11 @@ PointImage image_of(const Eigen::Vector3d& point, const StartFit::Vector& x, con
   const Eigen::Vector3d direction = R_BC * point.head<2>().homogeneous();
   const Eigen::Vector3d y = direction + inverse_depth * shift;  // in B, from the body at this moment
   const Eigen::Vector3d h_C0 = R_BC.transpose() * (R_BkB * y - inverse_depth * T_BC.p);
-  const Eigen::Matrix3d R_C0C1 = exp_so3(x.segment<3>(StartFit::stereo_rotation)) * cameras.T_C0C1.R;
-  const Eigen::Vector3d from_C1_C0 = h_C0 - inverse_depth * cameras.T_C0C1.p;
-  const Eigen::Vector3d h = camera == 0 ? h_C0 : Eigen::Vector3d(R_C0C1.transpose() * from_C1_C0);
+  const Pose T_C0C = camera == 0
+                         ? Pose{}
+                         : Pose{exp_so3(x.segment<3>(StartFit::stereo_rotation)) * cameras.T_C0C1.R, cameras.T_C0C1.p};
+  const Eigen::Vector3d from_C_C0 = h_C0 - inverse_depth * T_C0C.p;
+  const Eigen::Vector3d h = T_C0C.R.transpose() * from_C_C0;
   PointImage image;
   image.depth = h.z();
   const Eigen::Vector2d uv = h.hnormalized();
@@ -70,9 +72,9 @@ PointImage image_of(const Eigen::Vector3d& point, const StartFit::Vector& x, con
   Eigen::Matrix<double, 2, 3> by_h;
   by_h << Eigen::Matrix2d::Identity(), -uv;
   by_h *= (1.0 + lens(0)) / h.z();
-  const Eigen::Matrix<double, 2, 3> by_C0 = camera == 0 ? by_h : Eigen::Matrix<double, 2, 3>(by_h * R_C0C1.transpose());
+  const Eigen::Matrix<double, 2, 3> by_C0 = by_h * T_C0C.R.transpose();
   const Eigen::Matrix<double, 2, 3> by_body = by_C0 * R_BC.transpose();
-  image.by_point << by_body * R_BkB * R_BC.leftCols<2>(), by_body * (R_BkB * shift - T_BC.p);
+  image.by_point << by_body * R_BkB * R_BC.leftCols<2>(), by_body * (R_BkB * shift - T_BC.p) - by_C0 * T_C0C.p;
   image.by_position = -inverse_depth * by_body * R_BkB;
   image.by_state = image.by_position * moment.position_by_state();
   image.by_turn = by_body * R_BkB * skew(y);
@@ -81,10 +83,7 @@ PointImage image_of(const Eigen::Vector3d& point, const StartFit::Vector& x, con
   image.by_state.middleCols<3>(StartFit::camera_rotation) +=
       by_body * (skew(R_BkB * y) - R_BkB * skew(direction) - inverse_depth * skew(T_BC.p));
   image.by_state.middleCols<3>(StartFit::lens_of(camera)) << uv, Eigen::Matrix2d::Identity();
-  if (camera == 1) {
-    image.by_point.col(2) -= by_C0 * cameras.T_C0C1.p;
-    image.by_state.middleCols<3>(StartFit::stereo_rotation) = by_C0 * skew(from_C1_C0);
-  }
+  if (camera == 1) image.by_state.middleCols<3>(StartFit::stereo_rotation) = by_C0 * skew(from_C_C0);
   return image;
 }
 

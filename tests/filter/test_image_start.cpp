@@ -8,6 +8,7 @@
 #include <random>
 
 #include "ear/filter_config.h"
+#include "filter/ekf/initial_state.h"
 #include "filter/ekf/so3.h"
 #include "filter/start/start_moments.h"
 #include "tests/support/about.h"
@@ -42,8 +43,7 @@ StartSums sums(const Eigen::Vector3d& b_g, const Eigen::Vector3d& b_a) {
 
 /// One and a half seconds of a simulation, as its left camera sees them, or both.
 struct Clip {
-  std::vector<FeatureFrame> features;
-  std::vector<SeenFrame> frames;
+  std::vector<TimedFrame> frames;
   ImuBuffer imu{4096};
   CameraState cameras;
   StartNoise noise;
@@ -58,20 +58,14 @@ struct Clip {
       imu.push(sample);
     }
     const Calibration& calibration = simulation.calibration();
-    const Eigen::Isometry3d& T_BC0 = calibration.cameras[0].T_BC;
-    const Eigen::Isometry3d T_C0C1 = T_BC0.inverse() * calibration.cameras[1].T_BC;
-    cameras.T_BC0 = {T_BC0.linear(), T_BC0.translation()};
-    cameras.T_C0C1 = {T_C0C1.linear(), T_C0C1.translation()};
+    cameras = camera_state(calibration);
     noise = {start_sigma(PriorConfig{}, calibration), calibration.imu, kSigma};
-    std::vector<TimeNs> times;
     for (std::size_t i = 0; i < simulation.frame_times().size(); ++i) {
       const TimeNs t_ns = simulation.frame_times()[i];
       if (t_ns < begin_ns || t_ns > end_ns) continue;
-      features.push_back(simulation.tracks(i));
-      for (FeatureObservation& o : features.back().features) o.has_right = o.has_right && stereo;
-      times.push_back(t_ns);
+      frames.push_back({t_ns, simulation.tracks(i)});
+      for (FeatureObservation& o : frames.back().features.features) o.has_right = o.has_right && stereo;
     }
-    for (std::size_t i = 0; i < times.size(); ++i) frames.push_back({times[i], &features[i]});
   }
 
   [[nodiscard]] StartAttempt start() const { return image_start(frames, imu, cameras, noise); }
@@ -310,8 +304,8 @@ TEST_CASE("image start: no length is shown at a steady speed, and what contradic
 
   Clip exchanged(simulation, 10.0, kUnchanged, true);
   REQUIRE(exchanged.start().x);
-  for (FeatureFrame& frame : exchanged.features) {
-    for (FeatureObservation& o : frame.features) {
+  for (TimedFrame& frame : exchanged.frames) {
+    for (FeatureObservation& o : frame.features.features) {
       if (o.has_right) std::swap(o.left, o.right);
     }
   }
@@ -324,8 +318,8 @@ TEST_CASE("image start: no length is shown at a steady speed, and what contradic
   CHECK(by_bent.x->v_W.norm() == test::about(simulation.truth(by_bent.x->t_ns).v_W.norm(), 0.05));
 
   Clip few_right(simulation, 10.0, kUnchanged, true);
-  for (FeatureFrame& frame : few_right.features) {
-    for (FeatureObservation& o : frame.features) {
+  for (TimedFrame& frame : few_right.frames) {
+    for (FeatureObservation& o : frame.features.features) {
       o.has_right = o.has_right && o.id % 20 == 0;
       o.right.x() += 0.02;
     }
@@ -335,7 +329,7 @@ TEST_CASE("image start: no length is shown at a steady speed, and what contradic
   CHECK(by_left.x->v_W == Clip(simulation, 10.0, kUnchanged).start().x.value().v_W);
 
   Clip blind(simulation, 10.0, kUnchanged);
-  for (FeatureFrame& frame : blind.features) frame.features.resize(5);
+  for (TimedFrame& frame : blind.frames) frame.features.features.resize(5);
   CHECK(blind.start().lacks == Reason::few_frames);
   blind.frames.resize(2);
   CHECK(blind.start().lacks == Reason::few_frames);

@@ -4,20 +4,12 @@
 
 #include <cmath>
 
+#include "filter/ekf/initial_state.h"
 #include "tools/simulator/simulation.h"
 
 using namespace ear;
 
 namespace {
-
-CameraState cameras_of(const Calibration& calibration) {
-  CameraState cameras;
-  const Eigen::Isometry3d& T_BC0 = calibration.cameras[0].T_BC;
-  const Eigen::Isometry3d T_C0C1 = T_BC0.inverse() * calibration.cameras[1].T_BC;
-  cameras.T_BC0 = {T_BC0.linear(), T_BC0.translation()};
-  cameras.T_C0C1 = {T_C0C1.linear(), T_C0C1.translation()};
-  return cameras;
-}
 
 simulator::Simulation fly(double camera_rate_hz, std::uint64_t seed) {
   simulator::Options options;
@@ -38,7 +30,7 @@ std::optional<ImuState> start(const simulator::Simulation& simulation, double fr
     if (sample.t_ns >= begin_ns - 20'000'000 && sample.t_ns <= end_ns + 20'000'000) imu.push(sample);
   }
   MovingStart moving(FilterConfig{}, simulation.calibration());
-  const CameraState cameras = cameras_of(simulation.calibration());
+  const CameraState cameras = camera_state(simulation.calibration());
   for (std::size_t i = 0; i < simulation.frame_times().size(); ++i) {
     const TimeNs t_ns = simulation.frame_times()[i];
     if (t_ns < begin_ns || t_ns > end_ns) continue;
