@@ -169,7 +169,7 @@ Progress QueuedOdometry::process(std::optional<Estimate>& estimate, QueuedFrame*
   log_overflows();
   QueuedFrame* const frame = frames_.queue.front_to_empty();
   if (frame == nullptr) {
-    hand_over(std::numeric_limits<TimeNs>::max());
+    hand_over_samples();
     return Progress::no_frame;
   }
   const TimeNs frame_ns = imu_time(frame, frames_.time_offset);
@@ -181,6 +181,8 @@ Progress QueuedOdometry::process(std::optional<Estimate>& estimate, QueuedFrame*
   set_live_state();
   return estimate ? Progress::estimated : Progress::taken;
 }
+
+void QueuedOdometry::hand_over_samples() { hand_over(std::numeric_limits<TimeNs>::max()); }
 
 std::optional<TimeNs> QueuedOdometry::next_frame_ns() const {
   const QueuedFrame* const frame = frames_.queue.front();

@@ -79,6 +79,8 @@ class QueuedOdometry {
   /// (PerformanceConfig::budget_ms), frames but the newest are dropped while more than half of the inertial samples'
   /// queue waits. `keep`, if there is one, gets a frame that was taken, in exchange for its own: an empty_frame().
   Progress process(std::optional<Estimate>& estimate, QueuedFrame* keep = nullptr);
+  /// Hands over all samples that wait, and no frame: for when none comes. One that comes meanwhile is still there.
+  void hand_over_samples();
   /// The time of the oldest frame that waits (IMU time), or nothing.
   [[nodiscard]] std::optional<TimeNs> next_frame_ns() const;
   void start_at(const GivenStart& start) { odometry_.start_at(start); }

@@ -181,13 +181,13 @@ void LiveEstimator::take_sample() {
   samples_.pop();
   reached_ns_ = sample.imu.t_ns;
   if (listeners_.on_imu) listeners_.on_imu(sample);
+  if (!handed_over_ns_) handed_over_ns_ = reached_ns_;
   if (queued_.next_frame_ns()) return;
   if (steps_.due(reached_ns_)) {
     step_ns_ = reached_ns_;
-  } else if (std::abs(duration_ns(handed_over_ns_, reached_ns_)) > kLongestHeld) {
+  } else if (std::abs(duration_ns(*handed_over_ns_, reached_ns_)) > kLongestHeld) {
     handed_over_ns_ = reached_ns_;
-    std::optional<Estimate> none;
-    queued_.process(none);  // there is no frame: this only empties the queues
+    queued_.hand_over_samples();
   }
 }
 

@@ -97,7 +97,7 @@ class LiveEstimator {
   BlindSteps steps_;
   std::optional<TimeNs> step_ns_;                   ///< a step that is due
   TimeNs reached_ns_;                               ///< the newest inertial stamp taken
-  TimeNs handed_over_ns_ = 0;                       ///< up to here samples were given to the estimator
+  std::optional<TimeNs> handed_over_ns_;            ///< up to here samples were given to the estimator
   std::optional<std::chrono::nanoseconds> waited_;  ///< so long a frame or step has waited for other sensors
   std::chrono::steady_clock::time_point looked_;    ///< when the thread last looked for samples
   std::atomic<std::uint64_t> impatient_{0};

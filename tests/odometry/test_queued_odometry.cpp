@@ -142,6 +142,26 @@ TEST_CASE("queues: readings of other clocks are handed over where they belong") 
   }
 }
 
+TEST_CASE("queues: handing over the samples leaves a frame that came meanwhile") {
+  simulator::Options options;
+  options.seed = 12;
+  options.duration = 1.0;
+  options.camera_rate_hz = 6.0;
+  const simulator::Film drive(options);
+  QueuedOdometry odometry(Config{}, drive.simulation.calibration(), QueueCapacity{});
+  for (const ImuSample& sample : drive.simulation.imu()) REQUIRE(odometry.add_imu(sample));
+  const StereoFrame frame = drive.frame(0);
+  REQUIRE(odometry.add_stereo(frame));
+  odometry.hand_over_samples();
+  CHECK(odometry.odometry().input_counts().imu.accepted == drive.simulation.imu().size());
+  CHECK(odometry.odometry().input_counts().frames.accepted == 0);
+  REQUIRE(odometry.next_frame_ns());
+  std::optional<Estimate> estimate;
+  CHECK(odometry.process(estimate) != Progress::no_frame);
+  CHECK(odometry.odometry().input_counts().frames.accepted == 1);
+  CHECK_FALSE(odometry.next_frame_ns());
+}
+
 TEST_CASE("queues: a frame that was taken is handed on with its pixels, and later ones are as they came") {
   simulator::Options options;
   options.seed = 12;
