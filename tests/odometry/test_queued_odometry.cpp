@@ -154,11 +154,11 @@ TEST_CASE("queues: handing over the samples leaves a frame that came meanwhile")
   REQUIRE(odometry.add_stereo(frame));
   odometry.hand_over_samples();
   CHECK(odometry.odometry().input_counts().imu.accepted == drive.simulation.imu().size());
-  CHECK(odometry.odometry().input_counts().frames.accepted == 0);
+  CHECK(odometry.odometry().input_counts().camera.accepted == 0);
   REQUIRE(odometry.next_frame_ns());
   std::optional<Estimate> estimate;
   CHECK(odometry.process(estimate) != Progress::no_frame);
-  CHECK(odometry.odometry().input_counts().frames.accepted == 1);
+  CHECK(odometry.odometry().input_counts().camera.accepted == 1);
   CHECK_FALSE(odometry.next_frame_ns());
 }
 
