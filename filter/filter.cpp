@@ -75,14 +75,15 @@ std::optional<Estimate> Filter::report(bool image, const FrameAgreement& seen) {
   const std::optional<Estimate> estimate = make_estimate(sources_.ground().known(), scales);
   const HealthMonitor::Frame frame = health_frame(image, seen, estimate);
   health_.add_frame(frame, records_.log.records());
-  if (frame.running && !health_.possible()) stop();
+  if (frame.running && (!health_.possible() || (calibration_.cameras.empty() && health_.contradicted()))) stop();
   return give(estimate);
 }
 
 // ---- Starts
 
 /// While lost, the state goes on, and is good again if the cameras come to agree with it. Where they do not, but agree
-/// with the inertial samples, it is the state that is wrong, and begins anew.
+/// with the inertial samples, it is the state that is wrong, and begins anew; so it is where there is no camera, and
+/// the wheels do not agree with it.
 void Filter::start(const FeatureFrame& frame) {
   const bool lost = ekf_.running();
   const TimeNs t_ns = imu_time(frame.t_ns, camera_state(calibration_));  // what was learned may be as wrong as the rest

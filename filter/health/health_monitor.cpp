@@ -191,6 +191,12 @@ void HealthMonitor::judge_ground(const Frame& frame, const std::array<SourceReco
 
 bool HealthMonitor::possible() const { return last_.possible && last_.speed < kFastest; }
 
+/// Wheels say so where there is no camera, once what they contradict is lost.
+bool HealthMonitor::contradicted() const {
+  const FrameStatistics& last = last_.statistics;
+  return life_.contradicted || (lost() && !images_.any() && last.wheel_rows_rejected > 0 && !wheels_fit(last));
+}
+
 bool HealthMonitor::velocity_known() const {
   return last_.speed < kFastest && last_.velocity_sigma < std::max(kWorstVelocity, kWorstDirection * last_.speed);
 }
@@ -222,7 +228,7 @@ void HealthMonitor::decide(TimeNs t_ns) {
                    ((last_.statistics.tracks >= kFewFeatures && last_.agreement.contradicts()) || images_.misfit());
   if (!off || (fresh && wheels_carry(last_.statistics))) life_.fitting_ns = t_ns;
   if (off || health_.aiding == Aiding::none || !last_.running) life_.unproven_ns = t_ns;
-  life_.contradicted = last_.running && seconds_between(life_.fitting_ns, t_ns) > ImageHealth::kFitMemory;
+  life_.contradicted = last_.running && seconds_between(life_.fitting_ns, t_ns) > kLasting;
 
   health_.faulty.reset();
   for (std::size_t i = 0; i < kSourceCount; ++i) {

@@ -73,7 +73,7 @@ class HealthMonitor {
   /// Can a vehicle be where and as fast as the state says? Else it is no state.
   [[nodiscard]] bool possible() const;
   /// All sources but the inertial ones contradict the state, for long: it may be the state that is wrong.
-  [[nodiscard]] bool contradicted() const { return life_.contradicted; }
+  [[nodiscard]] bool contradicted() const;
 
  private:
   void judge_ground(const Frame& frame, const std::array<SourceRecord, kSourceCount>& records);

@@ -70,7 +70,7 @@ void ImageHealth::judge(TimeNs t_ns, bool running, const FrameAgreement& seen, c
   const double share = std::max(interval_ / kTracksMemory, 1.0 / (1.0 + counted_));
   usual_tracks_ += share * (tracks - usual_tracks_);
   ++counted_;
-  const double kept = std::exp(-interval_ / kFitMemory);
+  const double kept = std::exp(-interval_ / kLasting);
   used_ = kept * used_ + statistics.features_used;
   rejected_ = kept * rejected_ + statistics.features_rejected;
   carrying_.add(blind || misfit() || (known && seen.left > kMajority), t_ns);

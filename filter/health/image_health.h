@@ -40,8 +40,6 @@ class StampWatch {
 
 class ImageHealth {
  public:
-  static constexpr double kFitMemory = 1.0;  // [s] chosen: of what fits; contradicted for so long, the state is lost
-
   /// `cameras`: 0 to 2.
   explicit ImageHealth(std::size_t cameras) : cameras_(cameras) {}
 
@@ -60,6 +58,7 @@ class ImageHealth {
   /// Something that never happens to sound cameras.
   void report(TimeNs t_ns);
 
+  [[nodiscard]] bool any() const { return cameras_ > 0; }
   /// Did one come not long ago?
   [[nodiscard]] bool come(TimeNs t_ns) const;
   /// Do the images carry the estimate? They may where some of what they show is wrong, and where they come late but

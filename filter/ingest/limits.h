@@ -14,6 +14,9 @@ namespace ear {
 inline constexpr double kStreamGap = 0.25;
 /// [s] chosen: what a sensor showed so long ago shows nothing of now.
 inline constexpr double kStale = 0.5;
+/// [s] chosen: what goes on for so long is no chance of a moment: a clock that was set back, images that contradict the
+/// state or fit it, innovations that are alike.
+inline constexpr double kLasting = 1.0;
 /// [s] chosen: without inertial samples, or with nothing but these, for so long, and the state is lost. So stamps that
 /// are off by more are of another clock, and older readings start nothing.
 inline constexpr double kLostAfter = 2.0;

@@ -3,11 +3,6 @@
 #include "filter/ingest/limits.h"
 
 namespace ear {
-namespace {
-
-constexpr double kSetBack = 1.0;  // [s] chosen: of stamps in a row before a clock that runs behind is accepted
-
-}  // namespace
 
 Stamp StampGuard::judge(TimeNs t_ns) {
   const bool ahead = !last_ns_ || t_ns > *last_ns_;
@@ -21,7 +16,7 @@ Stamp StampGuard::judge(TimeNs t_ns) {
   if (!follows) run_from_ns_ = t_ns;
   run_to_ns_ = t_ns;
 
-  const bool confirmed = ahead ? run_ >= kConfirmed : seconds_between(run_from_ns_, t_ns) >= kSetBack;
+  const bool confirmed = ahead ? run_ >= kConfirmed : seconds_between(run_from_ns_, t_ns) >= kLasting;
   if (!confirmed) return ahead ? Stamp::far_ahead : Stamp::not_later;
   clock_shift_ = ahead ? 0 : run_from_ns_ - *last_ns_;
   last_ns_ = t_ns;

@@ -29,10 +29,9 @@ class ImuScore {
   void add_rest(const ImuStatistics& rest, const ImuCalibration& stated);
   /// The factors that a start in motion has measured.
   void set_start(const ImuNoiseFactors& factors) { at_rest_ = factors; }
-  /// Where there is no camera: what the accelerometer's samples show by themselves, as a factor. Vibration is not
-  /// white, so images know better. Not the gyroscope's: wheels would turn the vehicle instead, whose track width is a
-  /// guess.
-  void set_white_accel(double factor) { white_accel_ = factor; }
+  /// Where there is no camera: what the accelerometer's samples and the wheels show, as a factor. Images know better.
+  /// Not the gyroscope's: wheels would turn the vehicle instead, whose track width is a guess.
+  void set_unseen_accel(double factor) { unseen_accel_ = factor; }
   /// The motion from the state to a frame at `t_ns` by the inertial samples, and as the images show it. `P`: of the
   /// state's error. By how much the cameras turned faster than the gyroscope of late [rad/s], in the mean, about the
   /// axis where it is least likely; nothing if the images show too little.
@@ -43,7 +42,7 @@ class ImuScore {
 
  private:
   [[nodiscard]] ImuNoiseFactors learned() const {
-    return {at_rest_.gyro / gyro_.weight(), std::max(at_rest_.accel / accel_.weight(), white_accel_)};
+    return {at_rest_.gyro / gyro_.weight(), std::max(at_rest_.accel / accel_.weight(), unseen_accel_)};
   }
 
   /// Means over the last moments, which forget in kStale.
@@ -60,7 +59,7 @@ class ImuScore {
 
   bool adapts_;
   ImuNoiseFactors at_rest_;  ///< on the stated noise, when it last stood or started
-  double white_accel_ = 1.0;
+  double unseen_accel_ = 1.0;
   Excess excess_;
   NoiseScore gyro_{kNoiseMemory, kFarthest}, accel_{kNoiseMemory, kFarthest};
 };

@@ -1,5 +1,6 @@
 #include "filter/sources/sources.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "filter/ekf/imu_displacement.h"
@@ -67,7 +68,9 @@ void Sources::score_imu(const FeatureFrame& frame, const Consistency& consistenc
 }
 
 void Sources::advance(TimeNs t_ns, const Advice& advice, Ingest& ingest, Ekf& ekf, Records& records) {
-  if (cameras_.count() == 0) imu_score_.set_white_accel(ingest.white_accel());
+  if (cameras_.count() == 0) {
+    imu_score_.set_unseen_accel(std::max(ingest.white_accel(), wheels_ ? wheels_->accel_noise() : 1.0));
+  }
   while (const std::optional<Measurement> z = ingest.next(t_ns)) {
     propagate(z->t_ns, advice, ingest, ekf);
     const bool bridge_ahead =
@@ -76,10 +79,10 @@ void Sources::advance(TimeNs t_ns, const Advice& advice, Ingest& ingest, Ekf& ek
     if (!z->increment) {
       ground_.update(z->ranges, ingest.imu(), camera_update_, ekf, records);
     } else if (on_ground() && ground_.rolls_at(z->increment->from_ns)) {
-      wheels_->update(
-          *z->increment,
-          {ingest.imu(), ground_.known(), advice.of(MotionSensor::odometer), camera_update_, imu_score_.noise().gyro},
-          ekf, records);
+      wheels_->update(*z->increment,
+                      {ingest.imu(), ground_.known(), advice.of(MotionSensor::odometer), camera_update_,
+                       imu_score_.noise().gyro, standstill_.stands()},
+                      ekf, records);
     }
   }
   propagate(t_ns, advice, ingest, ekf);

@@ -447,6 +447,27 @@ TEST_CASE("health: without cameras too, the estimate is lost when nothing but in
   CHECK(drive.health().status != HealthStatus::lost);
   drive.imu_until(drive.t + 3.0);
   CHECK(drive.health().status == HealthStatus::lost);
+  CHECK_FALSE(drive.monitor.contradicted());  // they fitted, before they fell silent
+}
+
+TEST_CASE("health: without cameras a lost state is contradicted by wheels that do not fit") {
+  for (const std::size_t cameras : {0, 2}) {
+    Calibration calibration = vehicle();
+    calibration.cameras.resize(cameras);
+    Drive drive;
+    drive.monitor = HealthMonitor(calibration, true, true);
+    drive.frame.image = false;
+    drive.go_on(2.0);
+    drive.frame.statistics.wheel_rows_used = 6;
+    drive.frame.statistics.wheel_rows_rejected = 9;
+    drive.reject(Source::wheel_left);
+    drive.reject(Source::wheel_right);
+    drive.go_on(1.8);
+    CHECK_FALSE(drive.monitor.contradicted());
+    drive.go_on(0.4);
+    CHECK(drive.health().status == HealthStatus::lost);
+    CHECK(drive.monitor.contradicted() == (cameras == 0));
+  }
 }
 
 TEST_CASE("health: wheels that fit again after a slip keep the estimate, before they are known to be sound") {

@@ -26,6 +26,9 @@ void Wheels::update(const WheelIncrement& increment, const Context& context, Ekf
   const State& x = ekf.state();
   const BodyMotion motion = motion_at(middle_of(increment), x.imu, context.imu);
   mounting_.add(increment, context.imu, x.imu.b_g, motion.R_WB.transpose() * Eigen::Vector3d::UnitZ());
+  const Eigen::Vector2d rim = x.odometer.wheel_radius.cwiseProduct(increment.angle) / increment.duration();
+  path_noise_.add(rim.mean(), increment);
+  turn_noise_.add((rim(1) - rim(0)) / x.odometer.track_width, increment);
   MeanRate rate = context.imu.mean_rate(increment.from_ns, increment.to_ns);
   rate.noise_factor *= context.gyro_noise;
   WheelRows rows = linearize_wheels(x, motion.R_WB, motion.v_W, increment, rate.gyro_B, config_.model, sees_ground_);
@@ -43,7 +46,12 @@ void Wheels::update(const WheelIncrement& increment, const Context& context, Ekf
       const Innovation innovation = ekf.test(rows.H.row(row), rows.residual(row), sigma(row));
       if (row == WheelRows::slope && !innovation.fits) running_.lifted_ns = increment.to_ns;
       NoiseScore& score = running_.row[static_cast<std::size_t>(row)];
-      sigma(row) *= std::sqrt(score.add(innovation, sigma(row), config_.scores, increment.to_ns));
+      const double noise = sigma(row);
+      sigma(row) *= std::sqrt(score.add(innovation, noise, config_.scores, increment.to_ns));
+      if (row == WheelRows::side && !context.stands) {
+        const double variance = innovation.variance + sigma(row) * sigma(row) - noise * noise;
+        sideways_.add(innovation.value, variance, increment.to_ns);
+      }
       count(score, records.statistics);
     }
     z.H.row(z.count) = rows.H.row(row);
@@ -57,7 +65,8 @@ void Wheels::count(const NoiseScore& score, FrameStatistics& statistics) {
   ++(score.fits() ? statistics.wheel_rows_used : statistics.wheel_rows_rejected);
 }
 
-/// What slips or bumps is white in the distance; the counts and the gyroscope add their own.
+/// What slips or bumps is white in the distance; the readings and the gyroscope add their own. Readings are as noisy as
+/// stated, or as they show.
 Wheels::Sigmas Wheels::noise_of(const WheelRows& rows, const WheelIncrement& increment, const MeanRate& rate,
                                 const State& x) const {
   const double dt = increment.duration();
@@ -70,9 +79,14 @@ Wheels::Sigmas Wheels::noise_of(const WheelRows& rows, const WheelIncrement& inc
   // Of a speed, relative. An interval that seems short makes a speed that is too high: weights in proportion to the
   // interval leave the mean as it is.
   const double usual_dt = encoder_.rate_hz > 0.0 ? 1.0 / encoder_.rate_hz : dt;
-  const double stamp_noise = encoder_.stamp_sigma * std::sqrt(2.0 / (usual_dt * dt));
+  const double per_interval = 1.0 / std::sqrt(usual_dt * dt);
+  const double stamp_noise = encoder_.stamp_sigma * std::sqrt(2.0) * per_interval;
   // On springs and tyres the body does not point along its path, and no laser shows by how much.
   const double sway = sees_ground_ ? 0.0 : std::abs(rows.wheel_speed) / std::sqrt(dt);  // [m/s] per [rad sqrt(s)]
+  const double speed_noise =
+      std::max(std::hypot(count_noise, stamp_noise * rows.wheel_speed), path_noise_.of_increment() * per_interval);
+  const double turn_noise = std::max(std::hypot(count_noise * 2.0 / x.odometer.track_width, stamp_noise * yaw_rate),
+                                     turn_noise_.of_increment() * per_interval);
   const auto root_sum = [&](int row, std::initializer_list<double> sigmas) {
     double variance = 0.0;
     for (const double s : sigmas) variance += s * s;
@@ -81,13 +95,11 @@ Wheels::Sigmas Wheels::noise_of(const WheelRows& rows, const WheelIncrement& inc
   };
   const double floor = config_.speed_sigma;
   Sigmas sigma;
-  sigma << root_sum(WheelRows::speed,
-                    {floor, config_.slip * per_root_metre, count_noise, stamp_noise * rows.wheel_speed}),
+  sigma << root_sum(WheelRows::speed, {floor, config_.slip * per_root_metre, speed_noise}),
       root_sum(WheelRows::side,
                {floor, config_.side_slip * per_root_metre, config_.side_slip_turn * yaw_rate, config_.body_yaw * sway}),
       root_sum(WheelRows::slope, {floor, config_.roughness * per_root_metre, config_.body_pitch * sway}),
-      root_sum(WheelRows::yaw_rate,
-               {config_.yaw_rate_sigma, count_noise * 2.0 / x.odometer.track_width, stamp_noise * yaw_rate});
+      root_sum(WheelRows::yaw_rate, {config_.yaw_rate_sigma, turn_noise});
   return sigma;
 }
 

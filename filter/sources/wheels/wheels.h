@@ -11,8 +11,10 @@
 #include "filter/ekf/ekf.h"
 #include "filter/ekf/noise_score.h"
 #include "filter/ekf/records.h"
+#include "filter/ekf/whiteness_score.h"
 #include "filter/ingest/imu_buffer.h"
 #include "filter/sources/wheels/mounting_watch.h"
+#include "filter/sources/wheels/reading_noise.h"
 #include "filter/sources/wheels/wheel_rows.h"
 
 namespace ear {
@@ -29,6 +31,7 @@ class Wheels {
     double weight = 1.0;        ///< (15)
     CameraUpdate calibration = CameraUpdate::considered;
     double gyro_noise = 1.0;  ///< times the stated one
+    bool stands = false;
   };
   /// The filter's state is near the middle of the increment.
   void update(const WheelIncrement& increment, const Context& context, Ekf& ekf, Records& records);
@@ -42,6 +45,10 @@ class Wheels {
 
   /// Does the calibration seem to exchange or reverse axes, as far as they rolled on the ground?
   [[nodiscard]] bool misaligned() const { return mounting_.contradicts(); }
+
+  /// Factor on the accelerometer's noise, 1 or more: wheels do not slip sideways, and the state should not either.
+  /// Along the track and through the ground a slip and a bump would be taken for it.
+  [[nodiscard]] double accel_noise() const { return sideways_.factor(); }
 
   /// The state begins anew.
   void reset() { running_ = Running{}; }
@@ -69,6 +76,9 @@ class Wheels {
   ImuCalibration imu_;
   bool sees_ground_;
   MountingWatch mounting_;
+  ReadingNoise path_noise_;  ///< of the mean of both wheels' paths [m]
+  ReadingNoise turn_noise_;  ///< of the turn by their difference [rad]
+  WhitenessScore sideways_;  ///< of the row WheelRows::side
   Running running_;
 };
 
