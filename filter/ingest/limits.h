@@ -39,6 +39,8 @@ inline constexpr double kSlopeMemory = 100.0;
 inline constexpr double kPrecise = 0.05;
 /// [s] chosen: of the noise of inertial samples: a single image that is wrong changes little.
 inline constexpr double kNoiseMemory = 2.0;
+/// Chosen: times the usual or stated noise; less may be chance.
+inline constexpr double kNoisy = 1.25;
 inline constexpr double kClear = 4.0;  ///< chosen: so many standard deviations are not chance
 inline constexpr int kToKnow = 20;     ///< chosen: a mean of so many is known, whatever their rate
 /// Chosen: so many samples in a row confirm each other; one may have a false stamp.

@@ -11,7 +11,6 @@ namespace ear {
 namespace {
 
 constexpr double kSigmasPerMedian = 1.4826;  // standard deviation over median absolute deviation of a normal variable
-constexpr double kNoisy = 1.25;              // chosen: times the usual noise of a feature; less may be chance
 
 /// Standard deviation of an inverse depth by stereo [1/m]. `sigma`: of one observation, normalized.
 double inverse_depth_sigma(double sigma, const CameraState& cameras) {

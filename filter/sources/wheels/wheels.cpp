@@ -32,7 +32,8 @@ void Wheels::update(const WheelIncrement& increment, const Context& context, Ekf
   MeanRate rate = context.imu.mean_rate(increment.from_ns, increment.to_ns);
   rate.noise_factor *= context.gyro_noise;
   WheelRows rows = linearize_wheels(x, motion.R_WB, motion.v_W, increment, rate.gyro_B, config_.model, sees_ground_);
-  Sigmas sigma = noise_of(rows, increment, rate, x);
+  Sigmas sigma =
+      noise_of(rows, increment, rate, x, encoder_.rate_hz > 0.0 ? 1.0 / encoder_.rate_hz : increment.duration());
   add_delay(sigma, increment, ekf);
   score_wheels(rows, sigma, increment, context, ekf, records);
 
@@ -66,9 +67,9 @@ void Wheels::count(const NoiseScore& score, FrameStatistics& statistics) {
 }
 
 /// What slips or bumps is white in the distance; the readings and the gyroscope add their own. Readings are as noisy as
-/// stated, or as they show.
+/// stated, or as they show if that is clearly more.
 Wheels::Sigmas Wheels::noise_of(const WheelRows& rows, const WheelIncrement& increment, const MeanRate& rate,
-                                const State& x) const {
+                                const State& x, double usual_dt) const {
   const double dt = increment.duration();
   const double per_root_metre = std::sqrt(std::abs(rows.wheel_speed) / dt);
   const double yaw_rate = x.imu.rate_B(rate.gyro_B).norm();
@@ -78,15 +79,17 @@ Wheels::Sigmas Wheels::noise_of(const WheelRows& rows, const WheelIncrement& inc
                              std::sqrt(2.0);
   // Of a speed, relative. An interval that seems short makes a speed that is too high: weights in proportion to the
   // interval leave the mean as it is.
-  const double usual_dt = encoder_.rate_hz > 0.0 ? 1.0 / encoder_.rate_hz : dt;
   const double per_interval = 1.0 / std::sqrt(usual_dt * dt);
   const double stamp_noise = encoder_.stamp_sigma * std::sqrt(2.0) * per_interval;
   // On springs and tyres the body does not point along its path, and no laser shows by how much.
   const double sway = sees_ground_ ? 0.0 : std::abs(rows.wheel_speed) / std::sqrt(dt);  // [m/s] per [rad sqrt(s)]
-  const double speed_noise =
-      std::max(std::hypot(count_noise, stamp_noise * rows.wheel_speed), path_noise_.of_increment() * per_interval);
-  const double turn_noise = std::max(std::hypot(count_noise * 2.0 / x.odometer.track_width, stamp_noise * yaw_rate),
-                                     turn_noise_.of_increment() * per_interval);
+  const auto as_shown = [per_interval](double stated, const ReadingNoise& readings) {
+    const double shown = readings.of_increment() * per_interval;
+    return shown > kNoisy * stated ? shown : stated;
+  };
+  const double speed_noise = as_shown(std::hypot(count_noise, stamp_noise * rows.wheel_speed), path_noise_);
+  const double turn_noise =
+      as_shown(std::hypot(count_noise * 2.0 / x.odometer.track_width, stamp_noise * yaw_rate), turn_noise_);
   const auto root_sum = [&](int row, std::initializer_list<double> sigmas) {
     double variance = 0.0;
     for (const double s : sigmas) variance += s * s;
@@ -167,7 +170,7 @@ Displacement Wheels::displacement(const Ekf& ekf, const WheelIncrements& increme
   H.middleCols<3>(ground_column(err::nu)).setZero();  // the velocity is what they show
   Eigen::Matrix3d covariance =
       H * ekf.covariance().matrix().block<kGroundColumns, kGroundColumns>(err::nu, err::nu) * H.transpose();
-  covariance.diagonal() += noise_of(rows, whole, rate, x).head<3>().cwiseAbs2();
+  covariance.diagonal() += noise_of(rows, whole, rate, x, dt).head<3>().cwiseAbs2();
   const Eigen::Matrix3d J = dt * R_half * by_rows;
   result.p_BiBj = dt * R_half * v_B;
   result.covariance = J * covariance * J.transpose();

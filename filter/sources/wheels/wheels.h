@@ -57,8 +57,9 @@ class Wheels {
   using Sigmas = Eigen::Matrix<double, WheelRows::size, 1>;
 
   [[nodiscard]] bool uses_plane() const { return config_.model == OdometerModel::terrain && sees_ground_; }
+  /// `usual_dt` [s]: of increments like this one.
   [[nodiscard]] Sigmas noise_of(const WheelRows& rows, const WheelIncrement& increment, const MeanRate& rate,
-                                const State& x) const;
+                                const State& x, double usual_dt) const;
   static void add_delay(Sigmas& sigma, const WheelIncrement& increment, const Ekf& ekf);
   void score_wheels(WheelRows& rows, Sigmas& sigma, const WheelIncrement& increment, const Context& context,
                     const Ekf& ekf, Records& records);
