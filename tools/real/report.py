@@ -48,7 +48,7 @@ def notes(results):
             text += f" No estimate: \"{result['error']}\"."
         elif figures is None:
             text += " There is no truth."
-        elif figures["false_tracking"]["stretches"]:
+        elif figures["false_tracking"]["percent"] > 0.0:
             worst = max(figures["false_tracking"]["stretches"], key=lambda s: s["tracking_s"])
             text += (f" Longest false tracking: {worst['tracking_s']:.1f} s, up to {worst['largest_error_m']:.2f} m off after "
                      f"{worst['travelled_m']:.0f} m, {worst['most_sigmas']:.1f} standard deviations.")
