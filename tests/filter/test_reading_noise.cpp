@@ -37,8 +37,8 @@ double shown(const std::function<double(double)>& path, double noise, double lat
   return sum / count;
 }
 
-const auto steady = [](double t) { return 0.5 * t; };
-const auto to_and_fro = [](double t) { return 0.3 * std::sin(2.0 * t); };
+double steady(double t) { return 0.5 * t; }
+double to_and_fro(double t) { return 0.3 * std::sin(2.0 * t); }
 
 }  // namespace
 
