@@ -130,10 +130,9 @@ TEST_CASE("queues: readings of other clocks are handed over where they belong") 
   const std::vector<Estimate> plain = drive_by_clocks(simulation, 0.0, 0.0);
   REQUIRE(plain.size() > 50);
   CHECK(plain.back().state.v_W.norm() > 0.1);
-  for (const auto& [encoder_late, laser_late] :
-       {std::pair(0.05, -0.03), std::pair(-0.05, 0.3), std::pair(1800.0, 0.0)}) {
-    CAPTURE(encoder_late);
-    const std::vector<Estimate> shifted = drive_by_clocks(simulation, encoder_late, laser_late);
+  for (const auto& late : {std::pair(0.05, -0.03), std::pair(-0.05, 0.3), std::pair(1800.0, 0.0)}) {  // encoder, lasers
+    CAPTURE(late.first);
+    const std::vector<Estimate> shifted = drive_by_clocks(simulation, late.first, late.second);
     REQUIRE(shifted.size() == plain.size());
     for (std::size_t i = 0; i < plain.size(); ++i) {
       CHECK(shifted[i].state.p_WB == plain[i].state.p_WB);
