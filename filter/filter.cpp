@@ -75,7 +75,7 @@ std::optional<Estimate> Filter::report(bool image, const FrameAgreement& seen) {
   const std::optional<Estimate> estimate = make_estimate(sources_.ground().known(), scales);
   const HealthMonitor::Frame frame = health_frame(image, seen, estimate);
   health_.add_frame(frame, records_.log.records());
-  if (frame.running && (!health_.possible() || (calibration_.cameras.empty() && health_.contradicted()))) stop();
+  if (frame.running && !health_.possible()) stop();
   return give(estimate);
 }
 

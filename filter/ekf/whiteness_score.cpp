@@ -8,8 +8,7 @@
 namespace ear {
 namespace {
 
-constexpr double kMemory = 10.0;    // [s] measured: 3 s wavers, docs/decisions/0048
-constexpr double kFarthest = 10.0;  // chosen: times the stated noise, at most
+constexpr double kMemory = 10.0;  // [s] measured: 3 s wavers, docs/decisions/0048
 
 }  // namespace
 
@@ -26,7 +25,7 @@ void WhitenessScore::add(double innovation, double variance, TimeNs t_ns) {
   if (duration < kLasting) return;
   if (count_ >= kConfirmed) {
     const double square = std::min(kClear * kClear, sum_ * sum_ / count_);  // of what is no number too
-    log_factor_ = std::clamp(log_factor_ + duration / kMemory * (square - 1.0), 0.0, 2.0 * std::log(kFarthest));
+    log_factor_ = std::clamp(log_factor_ + duration / kMemory * (square - 1.0), 0.0, std::log(kFarthest));
   }
   from_ns_.reset();
 }

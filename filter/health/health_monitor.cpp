@@ -189,12 +189,10 @@ void HealthMonitor::judge_ground(const Frame& frame, const std::array<SourceReco
   for (std::size_t beam = 0; beam < beams_; ++beam) judge(beam_source(beam), no_range || no_return_[beam]);
 }
 
-bool HealthMonitor::possible() const { return last_.possible && last_.speed < kFastest; }
-
-/// Wheels say so where there is no camera, once what they contradict is lost.
-bool HealthMonitor::contradicted() const {
+bool HealthMonitor::possible() const {
   const FrameStatistics& last = last_.statistics;
-  return life_.contradicted || (lost() && !images_.any() && last.wheel_rows_rejected > 0 && !wheels_fit(last));
+  const bool refuted = lost() && !images_.any() && last.wheel_rows_rejected > 0 && !wheels_fit(last);
+  return last_.possible && last_.speed < kFastest && !refuted;
 }
 
 bool HealthMonitor::velocity_known() const {

@@ -70,10 +70,11 @@ class HealthMonitor {
   [[nodiscard]] bool usable() const {
     return health_.status == HealthStatus::tracking || health_.status == HealthStatus::degraded;
   }
-  /// Can a vehicle be where and as fast as the state says? Else it is no state.
+  /// Can a vehicle be where and as fast as the state says? And if it was lost, do the wheels not refute it, where no
+  /// camera can tell? Else it is no state.
   [[nodiscard]] bool possible() const;
   /// All sources but the inertial ones contradict the state, for long: it may be the state that is wrong.
-  [[nodiscard]] bool contradicted() const;
+  [[nodiscard]] bool contradicted() const { return life_.contradicted; }
 
  private:
   void judge_ground(const Frame& frame, const std::array<SourceRecord, kSourceCount>& records);

@@ -39,6 +39,8 @@ inline constexpr double kSlopeMemory = 100.0;
 inline constexpr double kPrecise = 0.05;
 /// [s] chosen: of the noise of inertial samples: a single image that is wrong changes little.
 inline constexpr double kNoiseMemory = 2.0;
+/// Chosen: of a variance, times the usual or stated one: noise that is learned is ten times that at most.
+inline constexpr double kFarthest = 100.0;
 /// Chosen: times the usual or stated noise; less may be chance.
 inline constexpr double kNoisy = 1.25;
 inline constexpr double kClear = 4.0;  ///< chosen: so many standard deviations are not chance

@@ -19,9 +19,6 @@ namespace ear {
 
 class ImuScore {
  public:
-  /// Chosen: of an innovation's square over the usual variance: ten times the usual noise at most.
-  static constexpr double kFarthest = 100.0;
-
   /// `adapts`: false for the noise that the calibration states.
   explicit ImuScore(bool adapts) : adapts_(adapts) {}
 

@@ -14,7 +14,6 @@
 #include "filter/ingest/limits.h"
 #include "filter/sources/cameras/stereo_motion.h"
 #include "filter/sources/cameras/triangulation.h"
-#include "filter/sources/imu_score.h"
 #include "filter/start/start_moments.h"
 
 namespace ear {
@@ -336,7 +335,7 @@ bool Problem::fits() const {
     const double inverse_depth = point.value.z() * std::sqrt(sums_[i].A(2, 2));  // in its standard deviations
     fitting += worst < kClear && inverse_depth > -kClear ? 1 : 0;
   }
-  if (!fit_.expected(x_, kClear) || std::max(noisier_[0], noisier_[1]) > ImuScore::kFarthest) return false;
+  if (!fit_.expected(x_, kClear) || std::max(noisier_[0], noisier_[1]) > kFarthest) return false;
   return squares <= kWorstFit * rows && fitting >= std::max<std::size_t>(kToKnow, points_.size() / 2);
 }
 

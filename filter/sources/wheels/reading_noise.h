@@ -28,8 +28,8 @@ class ReadingNoise {
     dt_ = dt;
   }
 
-  /// Standard deviation of what an increment is off by, two readings: of the path or angle.
-  [[nodiscard]] double of_increment() const { return std::sqrt(2.0 * std::max(0.0, -shared_ / 4.0)); }
+  /// Standard deviation of what an increment is off by, which has the errors of two readings: of the path or angle.
+  [[nodiscard]] double of_increment() const { return std::sqrt(0.5 * std::max(0.0, -shared_)); }
 
  private:
   TimeNs last_ns_ = 0;

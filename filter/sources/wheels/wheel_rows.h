@@ -22,6 +22,8 @@ struct WheelRows {
   Eigen::Matrix<double, size, kGroundColumns> H = Eigen::Matrix<double, size, kGroundColumns>::Zero();
   Eigen::Matrix<double, size, 3> J_gyro;  ///< of the prediction by the measured rate
   Eigen::Matrix3d direction;              ///< of speed, side and slope, in B
+  double rim_speed = 0.0;                 ///< mean of both rims against the body [m/s]
+  double turning = 0.0;                   ///< yaw rate by their difference [rad/s]
   double wheel_speed = 0.0;               ///< forward speed that the wheels measure [m/s]
 
   /// In place of the axle's middle, the speed is measured at this place on the axle, by the wheels and the gyroscope's

@@ -26,12 +26,11 @@ void Wheels::update(const WheelIncrement& increment, const Context& context, Ekf
   const State& x = ekf.state();
   const BodyMotion motion = motion_at(middle_of(increment), x.imu, context.imu);
   mounting_.add(increment, context.imu, x.imu.b_g, motion.R_WB.transpose() * Eigen::Vector3d::UnitZ());
-  const Eigen::Vector2d rim = x.odometer.wheel_radius.cwiseProduct(increment.angle) / increment.duration();
-  path_noise_.add(rim.mean(), increment);
-  turn_noise_.add((rim(1) - rim(0)) / x.odometer.track_width, increment);
   MeanRate rate = context.imu.mean_rate(increment.from_ns, increment.to_ns);
   rate.noise_factor *= context.gyro_noise;
   WheelRows rows = linearize_wheels(x, motion.R_WB, motion.v_W, increment, rate.gyro_B, config_.model, sees_ground_);
+  path_noise_.add(rows.rim_speed, increment);
+  turn_noise_.add(rows.turning, increment);
   Sigmas sigma =
       noise_of(rows, increment, rate, x, encoder_.rate_hz > 0.0 ? 1.0 / encoder_.rate_hz : increment.duration());
   add_delay(sigma, increment, ekf);
