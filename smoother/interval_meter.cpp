@@ -15,9 +15,9 @@ WheelNoise noise_of(const OdometerConfig& odometer, const Calibration& calibrati
   return calibration.encoder ? wheel_noise(odometer, *calibration.encoder, calibration.imu) : WheelNoise{};
 }
 
-std::vector<BeamRanges> ranges_until(TimeNs t_ns, Ingest& ingest) {
+std::vector<BeamRanges> ranges_until(TimeNs t_ns, double encoder_offset, Ingest& ingest) {
   std::vector<BeamRanges> ranges;
-  while (const std::optional<Measurement> z = ingest.next(t_ns)) {
+  while (const std::optional<Measurement> z = ingest.next(t_ns, encoder_offset)) {
     if (!z->increment) ranges.push_back(z->ranges);
   }
   return ranges;
@@ -69,7 +69,7 @@ std::optional<WheelDisplacement> IntervalMeter::roll(const Situation& now, Inges
         return true;
       });
   if (!complete) parts.clear();
-  const std::vector<BeamRanges> ranges = ranges_until(now.t_ns, ingest);
+  const std::vector<BeamRanges> ranges = ranges_until(now.t_ns, now.x.odometer.time_offset, ingest);
   if (!now.rolls) {
     normal_ns_ = now.t_ns;
     return std::nullopt;

@@ -119,6 +119,7 @@ ear::EncoderCalibration encoder_of(const ear_calibration& from) {
   encoder.wheel_radius_sigma = sigma_of(from.wheel_radius_sigma);
   encoder.wheel_radius_difference_sigma = sigma_of(from.wheel_radius_difference_sigma);
   encoder.track_width_sigma = sigma_of(from.track_width_sigma);
+  encoder.time_offset_sigma = sigma_of(from.encoder_time_offset_sigma);
   return encoder;
 }
 

@@ -99,6 +99,7 @@ class Odometry::Impl {
     if (learned.encoder) {
       learned.encoder->wheel_radius = {odometer.wheel_radius(0), odometer.wheel_radius(1)};
       learned.encoder->track_width = odometer.track_width;
+      learned.encoder->time_offset += odometer.time_offset;
       learned.encoder->T_BO = isometry(odometer.T_BO);
     }
     if (learned.lasers) {

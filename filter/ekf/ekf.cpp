@@ -209,8 +209,9 @@ bool Ekf::possible() const {
   const ImuState& x = state_.imu;
   const OdometerState& o = state_.odometer;
   const auto P = covariance_.matrix();
-  const bool finite = std::abs(state_.camera.time_offset) <= kLargestTimeOffset && x.R_WB.allFinite() &&
-                      x.p_WB.allFinite() && x.v_W.allFinite() && x.b_g.allFinite() && x.b_a.allFinite() &&
+  const bool finite = std::abs(state_.camera.time_offset) <= kLargestTimeOffset &&
+                      std::abs(o.time_offset) <= kLargestTimeOffset && x.R_WB.allFinite() && x.p_WB.allFinite() &&
+                      x.v_W.allFinite() && x.b_g.allFinite() && x.b_a.allFinite() &&
                       state_.camera.T_BC0.R.allFinite() && state_.camera.T_BC0.p.allFinite() &&
                       o.wheel_radius.allFinite() && std::isfinite(o.track_width) && o.T_BO.R.allFinite() &&
                       o.T_BO.p.allFinite() && o.beam_offset.allFinite() && state_.ground.n_W.allFinite() &&

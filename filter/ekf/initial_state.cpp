@@ -142,6 +142,7 @@ FilterConfig settings_for(const FilterConfig& config, const Calibration& calibra
       prior.wheel_apart = 1.0 / std::sqrt(2.0 * std::max(missing, 1.0));
     }
     if (const auto& sigma = encoder->track_width_sigma) prior.track_width = *sigma / encoder->track_width;
+    prior.encoder_time_offset = encoder->time_offset_sigma.value_or(prior.encoder_time_offset);
     state_pose(encoder->T_BO_sigma, prior.odometer_rotation, prior.axle);
     state_pose(encoder->T_BO_sigma, prior.odometer_unseen, prior.axle_unseen);
   }

@@ -28,7 +28,8 @@ inline constexpr int wheel_radius = normal + 2;     ///< left, right, relative: 
 inline constexpr int track_width = normal + 4;      ///< relative: 1
 inline constexpr int odometer = normal + 5;         ///< phi, turn of O about its own axes [rad]: 3
 inline constexpr int axle = odometer + 3;           ///< position of O in the body [m]: 3
-inline constexpr int beams = axle + 3;              ///< offset of each laser beam's range [m]
+inline constexpr int encoder_offset = axle + 3;     ///< [s] of the encoders' clock: 1
+inline constexpr int beams = encoder_offset + 1;    ///< offset of each laser beam's range [m]
 inline constexpr int camera = beams + kMaxBeams;    ///< phi, p of camera 0 in the body: 6
 inline constexpr int stereo = camera + 6;           ///< phi, p of camera 1 in camera 0: 6
 inline constexpr int baseline = stereo + 3;         ///< its p
@@ -88,6 +89,7 @@ struct OdometerState {
   Eigen::Vector2d wheel_radius = Eigen::Vector2d::Ones();  ///< left, right [m]
   double track_width = 1.0;                                ///< [m]
   Pose T_BO;                                               ///< middle of the axle to body
+  double time_offset = 0.0;                                ///< [s] add to an encoder's stamp to get IMU time
   Eigen::Matrix<double, kMaxBeams, 1> beam_offset =
       Eigen::Matrix<double, kMaxBeams, 1>::Zero();  ///< of the laser beams: measured less true range [m]
 };

@@ -95,15 +95,16 @@ std::optional<TimeNs> Ingest::push(const BeamRanges& ranges, bool has_state) {
   return append(ranges_, ranges, &BeamRanges::t_ns, &BeamRanges::t_ns, has_state);
 }
 
-std::optional<Measurement> Ingest::next(TimeNs t_ns) {
-  const bool wheels_next =
-      !increments_.empty() && (ranges_.empty() || middle_of(increments_.front()) < ranges_.front().t_ns);
+std::optional<Measurement> Ingest::next(TimeNs t_ns, double encoder_offset) {
+  const auto wheels_at = [&] { return later_by(encoder_offset, middle_of(increments_.front())); };
+  const bool wheels_next = !increments_.empty() && (ranges_.empty() || wheels_at() < ranges_.front().t_ns);
   if (!wheels_next && ranges_.empty()) return std::nullopt;
   Measurement measurement;
-  measurement.t_ns = wheels_next ? middle_of(increments_.front()) : ranges_.front().t_ns;
+  measurement.t_ns = wheels_next ? wheels_at() : ranges_.front().t_ns;
   if (measurement.t_ns > t_ns) return std::nullopt;
   if (wheels_next) {
-    measurement.increment = passed_increment_ = increments_.front();
+    passed_increment_ = increments_.front();
+    measurement.increment = later_by(encoder_offset, *passed_increment_);
     increments_.pop();
   } else {
     measurement.ranges = ranges_.front();

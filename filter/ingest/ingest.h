@@ -63,8 +63,8 @@ class Ingest {
   /// before the next one. Without a state, the oldest make room.
   [[nodiscard]] std::optional<TimeNs> push(const WheelIncrement& increment, bool has_state);
   [[nodiscard]] std::optional<TimeNs> push(const BeamRanges& ranges, bool has_state);
-  /// The next one that is not later than `t_ns`, in time order.
-  [[nodiscard]] std::optional<Measurement> next(TimeNs t_ns);
+  /// The next one that is not later than `t_ns`, in time order. `encoder_offset` [s] is added to the wheels' times.
+  [[nodiscard]] std::optional<Measurement> next(TimeNs t_ns, double encoder_offset);
   /// All that are earlier.
   void drop_before(TimeNs t_ns);
   void drop_readings();

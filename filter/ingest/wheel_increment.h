@@ -26,6 +26,11 @@ struct WheelIncrement {
   return increment.from_ns + (increment.to_ns - increment.from_ns) / 2;
 }
 
+/// The same by another clock: `offset` [s] is added.
+[[nodiscard]] inline WheelIncrement later_by(double offset, const WheelIncrement& increment) {
+  return {later_by(offset, increment.from_ns), later_by(offset, increment.to_ns), increment.angle};
+}
+
 /// Increments in time order: one that the state has passed, if there is one, and those to come.
 class WheelIncrements {
  public:

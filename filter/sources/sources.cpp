@@ -71,7 +71,7 @@ void Sources::advance(TimeNs t_ns, const Advice& advice, Ingest& ingest, Ekf& ek
   if (cameras_.count() == 0) {
     imu_score_.set_unseen_accel(std::max(ingest.white_accel(), wheels_ ? wheels_->accel_noise() : 1.0));
   }
-  while (const std::optional<Measurement> z = ingest.next(t_ns)) {
+  while (const std::optional<Measurement> z = ingest.next(t_ns, ekf.state().odometer.time_offset)) {
     propagate(z->t_ns, advice, ingest, ekf);
     const bool bridge_ahead =
         cameras_.count() > 1 && cameras_.last_image() && ingest.interruption().waits_for_images(ekf.state().imu.t_ns);

@@ -231,6 +231,7 @@ Eigen::VectorXd Start::sigma() const {
       sigma.segment<3>(err::odometer).setConstant(beams > 0 ? prior.odometer_rotation : prior.odometer_unseen);
     }
     if (online.axle) sigma.segment<3>(err::axle).setConstant(beams > 0 ? prior.axle : prior.axle_unseen);
+    if (online.encoder_time_offset) sigma(err::encoder_offset) = prior.encoder_time_offset;
     if (online.beam_offset) sigma.segment(err::beams, beams).setConstant(prior.beam_offset);
   }
   return sigma;

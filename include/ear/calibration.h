@@ -66,10 +66,9 @@ struct EncoderCalibration {
   std::array<double, 2> wheel_radius{0.075, 0.075};  ///< left, right [m]
   double track_width = 0.40;                         ///< [m]
   double noise_counts = 2.0;                         ///< one reading, 1-sigma [count]
-  double stamp_sigma = 0.0;  ///< one reading's stamp [s]: how far its counts may be of another time
-  double time_offset = 0.0;  ///< [s] add it to a stamp to get IMU time
-  /// [s] what a calibration knows it to; the filters take the offset as it is.
-  std::optional<double> time_offset_sigma;
+  double stamp_sigma = 0.0;                 ///< one reading's stamp [s]: how far its counts may be of another time
+  double time_offset = 0.0;                 ///< [s] add it to a stamp to get IMU time
+  std::optional<double> time_offset_sigma;  ///< [s]
   std::optional<PoseSigma> T_BO_sigma;
   std::optional<double> wheel_radius_sigma;             ///< of the mean of both radii [m]
   std::optional<double> wheel_radius_difference_sigma;  ///< of the left radius less the right one [m]
@@ -89,7 +88,7 @@ struct LaserCalibration {
   double range_max = 4.0;    ///< [m]
   double noise = 0.004;      ///< 1-sigma [m]
   double time_offset = 0.0;  ///< [s] add it to a stamp to get IMU time
-  /// [s] what a calibration knows it to; the filters take the offset as it is.
+  /// [s] what a calibration knows it to; the filter takes the offset as it is.
   std::optional<double> time_offset_sigma;
   std::optional<double> offset_sigma;  ///< of what each beam reads too much [m]
 };

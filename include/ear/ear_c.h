@@ -95,6 +95,7 @@ typedef struct {
   double wheel_radius_sigma;                               /* of the mean of both radii [m] */
   double wheel_radius_difference_sigma;                    /* of left less right [m] */
   double track_width_sigma;                                /* [m] */
+  double encoder_time_offset_sigma;                        /* [s] */
   double beam_offset_sigma;                                /* of what each beam reads too much [m] */
 } ear_calibration;
 

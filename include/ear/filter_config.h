@@ -22,37 +22,39 @@ struct StandstillConfig {
 
 /// Standard deviations at the start, before anything was measured.
 struct PriorConfig {
-  double gyro_bias = 0.1;           ///< [rad/s]
-  double gyro_scale = 3e-3;         ///< relative, of each axis
-  double gyro_unseen = 3e-2;        ///< the same where there is no camera
-  double accel_bias = 0.08;         ///< [m/s^2]
-  double camera_rotation = 2.5e-3;  ///< [rad] camera 0 in the body, where it is estimated
-  double camera_position = 1e-3;    ///< [m]
-  double stereo_rotation = 2e-3;    ///< [rad] camera 1 in camera 0: rigs bend
-  double stereo_position = 5e-5;    ///< [m]
-  double focal_length = 1e-3;       ///< of each camera, relative
-  double principal_point = 0.5;     ///< [px] of each camera, each axis
-  double time_offset = 2e-3;        ///< [s] camera against IMU
-  double wheel_radius = 4e-3;       ///< of each wheel, relative; of their mean, over sqrt(2)
-  double wheel_apart = 1e-3;        ///< of each wheel by itself, relative
-  double wheel_scale = 5e-2;        ///< of both wheels alike, relative, where neither camera nor lasers exist
-  double track_width = 5e-3;        ///< relative
-  double odometer_rotation = 5e-3;  ///< [rad] odometer in the body
-  double odometer_unseen = 2e-2;    ///< [rad] the same without lasers, where it is what was guessed
-  double axle = 3e-3;               ///< [m] middle of the axle in the body
-  double axle_unseen = 0.1;         ///< [m] the same without lasers
-  double beam_offset = 2e-3;        ///< [m] range of each laser beam
+  double gyro_bias = 0.1;             ///< [rad/s]
+  double gyro_scale = 3e-3;           ///< relative, of each axis
+  double gyro_unseen = 3e-2;          ///< the same where there is no camera
+  double accel_bias = 0.08;           ///< [m/s^2]
+  double camera_rotation = 2.5e-3;    ///< [rad] camera 0 in the body, where it is estimated
+  double camera_position = 1e-3;      ///< [m]
+  double stereo_rotation = 2e-3;      ///< [rad] camera 1 in camera 0: rigs bend
+  double stereo_position = 5e-5;      ///< [m]
+  double focal_length = 1e-3;         ///< of each camera, relative
+  double principal_point = 0.5;       ///< [px] of each camera, each axis
+  double time_offset = 2e-3;          ///< [s] camera against IMU
+  double wheel_radius = 4e-3;         ///< of each wheel, relative; of their mean, over sqrt(2)
+  double wheel_apart = 1e-3;          ///< of each wheel by itself, relative
+  double wheel_scale = 5e-2;          ///< of both wheels alike, relative, where neither camera nor lasers exist
+  double track_width = 5e-3;          ///< relative
+  double odometer_rotation = 5e-3;    ///< [rad] odometer in the body
+  double odometer_unseen = 2e-2;      ///< [rad] the same without lasers, where it is what was guessed
+  double axle = 3e-3;                 ///< [m] middle of the axle in the body
+  double axle_unseen = 0.1;           ///< [m] the same without lasers
+  double encoder_time_offset = 2e-3;  ///< [s] encoders against IMU
+  double beam_offset = 2e-3;          ///< [m] range of each laser beam
 };
 
 /// What is calibrated while running. A frozen quantity keeps its value, and its uncertainty is not accounted for.
 struct OnlineCalibrationConfig {
-  bool camera_extrinsics = true;  ///< pose of camera 0 in the body, and of camera 1 in camera 0
-  bool intrinsics = true;         ///< focal length and principal point of each camera
-  bool time_offset = true;        ///< camera against IMU
-  bool wheels = true;             ///< wheel radii, and their track width where the yaw rate is used
-  bool odometer_rotation = true;  ///< the odometer's mounting in the body
-  bool axle = true;               ///< the middle of the axle in the body
-  bool beam_offset = true;        ///< what each laser beam reads too much
+  bool camera_extrinsics = true;    ///< pose of camera 0 in the body, and of camera 1 in camera 0
+  bool intrinsics = true;           ///< focal length and principal point of each camera
+  bool time_offset = true;          ///< camera against IMU
+  bool wheels = true;               ///< wheel radii, and their track width where the yaw rate is used
+  bool odometer_rotation = true;    ///< the odometer's mounting in the body
+  bool axle = true;                 ///< the middle of the axle in the body
+  bool encoder_time_offset = true;  ///< encoders against IMU
+  bool beam_offset = true;          ///< what each laser beam reads too much
 };
 
 /// What is made of the wheels; the paper's Table II compares them.

@@ -77,6 +77,7 @@ EnableFor<C, PriorConfig> visit(C& c, F&& f) {
   f("odometer_unseen", c.odometer_unseen);
   f("axle", c.axle);
   f("axle_unseen", c.axle_unseen);
+  f("encoder_time_offset", c.encoder_time_offset);
   f("beam_offset", c.beam_offset);
 }
 
@@ -101,6 +102,7 @@ EnableFor<C, OnlineCalibrationConfig> visit(C& c, F&& f) {
   f("wheels", c.wheels);
   f("odometer_rotation", c.odometer_rotation);
   f("axle", c.axle);
+  f("encoder_time_offset", c.encoder_time_offset);
   f("beam_offset", c.beam_offset);
 }
 

@@ -109,6 +109,7 @@ nlohmann::ordered_json to_json(const Calibration& calibration) {
     json["wheel_radius_left"] = calibration.encoder->wheel_radius[0];
     json["wheel_radius_right"] = calibration.encoder->wheel_radius[1];
     json["track_width"] = calibration.encoder->track_width;
+    json["encoder_time_offset"] = calibration.encoder->time_offset;
     json["T_BO"] = to_json(calibration.encoder->T_BO);
   }
   if (calibration.lasers) {

@@ -57,7 +57,7 @@ TEST_CASE("ingest: readings come out in the order of their times, increments at 
     CHECK_FALSE(ingest.push(BeamRanges(LaserSample{t_ns, {0.1, 0.2, 0.3}}, LaserCalibration{}), true));
   }
   std::vector<TimeNs> times;
-  while (const auto next = ingest.next(18 * kMs)) {
+  while (const auto next = ingest.next(18 * kMs, 0.0)) {
     times.push_back(next->t_ns);
     CHECK(next->increment.has_value() == (next->t_ns % (5 * kMs) == 0));
   }
@@ -178,7 +178,7 @@ TEST_CASE("ingest: a restart forgets samples and readings, not the counts") {
   push(ingest, 20 * kMs, 5);
   ingest.restart();
   CHECK(ingest.imu().empty());
-  CHECK_FALSE(ingest.next(1000 * kMs));
+  CHECK_FALSE(ingest.next(1000 * kMs, 0.0));
   CHECK(ingest.increments().size() == 0);
   CHECK(ingest.counts().encoder.accepted == 2);
   CHECK(ingest.counts().imu.accepted == 11);
@@ -188,11 +188,33 @@ TEST_CASE("ingest: of readings that are dropped, passed ones too, nothing is lef
   Ingest ingest = filled(50 * kMs);
   for (int i = 0; i < 4; ++i) push(ingest, 10 * kMs * i, i);
   CHECK_FALSE(ingest.push(BeamRanges(LaserSample{20 * kMs, {0.1, 0.2, 0.3}}, LaserCalibration{}), true));
-  REQUIRE(ingest.next(10 * kMs));
+  REQUIRE(ingest.next(10 * kMs, 0.0));
   REQUIRE(ingest.increments().size() == 3);
   ingest.drop_readings();
   CHECK(ingest.increments().size() == 0);
-  CHECK_FALSE(ingest.next(1000 * kMs));
+  CHECK_FALSE(ingest.next(1000 * kMs, 0.0));
+}
+
+TEST_CASE("ingest: readings come at their stamps plus the encoders' offset, in the order that these then have") {
+  for (const double offset : {0.012, -0.012}) {
+    CAPTURE(offset);
+    Ingest ingest = filled(50 * kMs);
+    for (int i = 0; i < 3; ++i) push(ingest, 10 * kMs * i, i);  // middles at 5 and 15 ms
+    CHECK_FALSE(ingest.push(BeamRanges(LaserSample{8 * kMs, {0.1, 0.2, 0.3}}, LaserCalibration{}), true));
+    std::vector<TimeNs> wheels;
+    for (int i = 0; i < 3; ++i) {
+      const std::optional<Measurement> next = ingest.next(50 * kMs, offset);
+      REQUIRE(next);
+      CHECK(next->increment.has_value() != (i == (offset > 0.0 ? 0 : 2)));
+      if (!next->increment) continue;
+      CHECK(next->t_ns == middle_of(*next->increment));
+      wheels.push_back(next->t_ns);
+    }
+    const TimeNs moved = later_by(offset, TimeNs{0});
+    CHECK(wheels == std::vector<TimeNs>{5 * kMs + moved, 15 * kMs + moved});
+    CHECK(ingest.increments().size() == 1);  // as stamped
+    CHECK(ingest.increments()[0].to_ns == 20 * kMs);
+  }
 }
 
 TEST_CASE("ingest: of a full queue the state has to pass the oldest first; without a state it makes room") {
@@ -205,7 +227,7 @@ TEST_CASE("ingest: of a full queue the state has to pass the oldest first; witho
     REQUIRE(ingest.waiting_increments().size() < 10000);
   }
   CHECK(*due_ns == 10 * kMs);
-  while (ingest.next(*due_ns)) continue;
+  while (ingest.next(*due_ns, 0.0)) continue;
   CHECK_FALSE(ingest.push(increment, false));
   CHECK(seconds_between(ingest.waiting_increments().front().from_ns, increment.to_ns) <= 2.0);
   CHECK(seconds_between(ingest.waiting_increments().front().from_ns, increment.to_ns) > 1.9);

@@ -445,6 +445,8 @@ TEST_CASE("C interface: what cannot be used is refused with its reason") {
     const auto spoil_lasers = [offset](C& c, S&) { c.laser_time_offset = offset; };
     CHECK(reason_of(spoil_lasers).find("the lasers' time_offset") != std::string::npos);
   }
+  CHECK(reason_of([](C& c, S&) { c.encoder_time_offset_sigma = -1e-3; }).find("time_offset_sigma") !=
+        std::string::npos);
   CHECK(reason_of([](C& c, S&) { c.wheel_radius_sigma = -1e-3; }).find("wheel_radius_sigma") != std::string::npos);
   CHECK(reason_of([](C& c, S&) { c.cameras[1].rotation_sigma = 1e-3; }).find("pose_sigma") != std::string::npos);
   CHECK(reason_of([](C& c, S&) { c.cameras[1].focal_length_sigma = 0.5; }).find("intrinsics_sigma") !=

@@ -141,6 +141,27 @@ TEST_CASE("filter: learns the calibration, and leaves it alone where it is froze
   CHECK(frozen.ekf().state().camera.time_offset == simulation.calibration().camera_time_offset);
 }
 
+TEST_CASE("filter: finds out how late the encoders are, unless that is frozen") {
+  const simulator::Simulation simulation = simulate("flat1", 30.0);
+  const auto offset = [&](double late, bool learned) {
+    FilterConfig config;
+    config.online_calibration.encoder_time_offset = learned;
+    Filter filter(config, simulation.calibration());
+    experiments::ReplayOptions options;
+    options.change_encoder = [late](EncoderSample sample) {
+      sample.t_ns = later_by(late, sample.t_ns);
+      return sample;
+    };
+    experiments::replay(
+        simulation, filter, [](TimeNs, const Estimate&) {}, options);
+    return filter.ekf().state().odometer.time_offset;
+  };
+  CHECK(std::abs(offset(0.0, true)) < 1.5e-3);
+  CHECK(std::abs(offset(0.03, true) + 0.03) < 4e-3);  // 15 standard deviations of the prior: it is drawn to that
+  CHECK(std::abs(offset(-0.02, true) - 0.02) < 3e-3);
+  CHECK(offset(0.03, false) == 0.0);
+}
+
 TEST_CASE("filter: swaying in place it stays where it is, by camera and IMU alone") {
   // The features of the first clones end long before the swaying does: the window must follow them.
   const simulator::Simulation simulation = simulate("sway1", 36.0);

@@ -81,6 +81,8 @@ void add_differences(const ear::Calibration& truth, const ear::Calibration& give
     add(draws["beam " + std::to_string(i) + " origin [mm]"], 1e3 * (b.p_BL - a.p_BL));
   }
   draws["time [ms]"].push_back(1e3 * (given.camera_time_offset - truth.camera_time_offset));
+  draws["encoders' time [ms]"].push_back(1e3 * (given.encoder->time_offset - truth.encoder->time_offset));
+  draws["lasers' time [ms]"].push_back(1e3 * (given.lasers->time_offset - truth.lasers->time_offset));
 }
 
 /// Of all seeds.
@@ -171,6 +173,8 @@ TEST_CASE("calibration error: every quantity is drawn with its standard deviatio
       {"beam 2 direction [deg]", 0.3},
       {"beam 2 origin [mm]", 2.0},
       {"time [ms]", 2.0},
+      {"encoders' time [ms]", 2.0},
+      {"lasers' time [ms]", 2.0},
       {"accelerometer bias [m/s^2]", 0.08},
   };
   for (const double factor : {1.0, 3.0}) {

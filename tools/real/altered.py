@@ -3,6 +3,7 @@
 Nobody tuned to these. An estimate may be poor then, and may be refused; its health must not say "tracking" where it is far off.
 """
 
+import math
 import random
 import re
 import shutil
@@ -142,6 +143,31 @@ def lost_readings(rows):
     return [row for row in rows if draws.random() > 0.3]
 
 
+def scattered_readings(rows):
+    draws = random.Random(6)
+    return sorted(([str(int(row[0]) + round(draws.gauss(0.0, 5e6))), *row[1:]] for row in rows), key=lambda row: int(row[0]))
+
+
+def coarse_wheels(copy):
+    """An encoder of 360 counts a turn; sensor.yaml says so."""
+    path = copy.mav0 / WHEELS / "sensor.yaml"
+    text = path.read_text(encoding="utf-8")
+    resolution, noise = (float(re.search(key + r": *([0-9.]+)", text)[1]) for key in ("resolution", "noise_counts"))
+    coarser = 360 / resolution
+    text = re.sub(r"resolution: *[0-9.]+", "resolution: 360", text)
+    path.write_text(re.sub(r"noise_counts: *[0-9.]+", f"noise_counts: {max(1.0, noise * coarser):g}", text), encoding="utf-8")
+    copy.change([WHEELS], lambda rows: [[time, *(str(math.floor(int(count) * coarser)) for count in counts)] for time, *counts in rows])
+
+
+def slow_wheels(copy):
+    """10 Hz."""
+    rows = copy.rows(WHEELS)
+    seconds = 1e-9 * (int(rows[-1][0]) - int(rows[0][0]))
+    count = max(1, round(len(rows) / seconds / 10))
+    copy.change([WHEELS], every(count))
+    copy.set_rate(WHEELS, count)
+
+
 def exchanged(a, b):
     def change(rows):
         for row in rows:
@@ -210,6 +236,10 @@ ALTERATIONS = [
                on([WHEELS], lambda rows: [[t, str(-int(left)), str(-int(right))] for t, left, right in rows]), (WHEELS,)),
     Alteration("wheel_ends", "the left wheel's counts stay, in the second half", on([WHEELS], stuck_left_wheel), (WHEELS,)),
     Alteration("wheels_lost", "three of ten readings of the wheels lost, at random", on([WHEELS], lost_readings), (WHEELS,)),
+    Alteration("wheels_slow", "readings of the wheels at 10 Hz", slow_wheels, (WHEELS,)),
+    Alteration("wheels_coarse", "wheels of 360 counts a turn", coarse_wheels, (WHEELS,)),
+    Alteration("wheels_stamps", "stamps of the wheels scatter by 5 ms", on([WHEELS], scattered_readings), (WHEELS,)),
+    Alteration("wheels_late", "stamps of the wheels 50 ms late", on([WHEELS], later(0.05)), (WHEELS,)),
     Alteration("beams_exchanged", "first and last beam exchanged", on([BEAMS], exchanged(1, 3)), (BEAMS,)),
     Alteration("begins_late", "without the first third: it starts in motion", begin_late),
 ]

@@ -78,6 +78,8 @@ CalibrationErrors draw_calibration_errors(std::uint64_t seed, double factor) {
   errors.camera_time_offset = normal(rng, factor * kTimeOffset);
   const double more_bias = std::sqrt(kAccelBias * kAccelBias - kInitialAccelBias * kInitialAccelBias);
   errors.accel_bias = normal3(rng, factor * more_bias);
+  errors.encoder_time_offset = normal(rng, factor * kTimeOffset);
+  errors.laser_time_offset = normal(rng, factor * kTimeOffset);
   return errors;
 }
 
@@ -111,6 +113,8 @@ Calibration with_errors(Calibration given, const CalibrationErrors& errors) {
     beam.p_BL += errors.beams[i].origin_B;
   }
   given.camera_time_offset += errors.camera_time_offset;
+  encoder.time_offset += errors.encoder_time_offset;
+  given.lasers->time_offset += errors.laser_time_offset;
   return given;
 }
 

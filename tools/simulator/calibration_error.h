@@ -32,7 +32,9 @@ struct CalibrationErrors {
   Eigen::Vector3d odometer_rotation_B = Eigen::Vector3d::Zero();  ///< [rad]
   Eigen::Vector3d odometer_position_B = Eigen::Vector3d::Zero();  ///< [m]
   std::array<Beam, 3> beams;
-  double camera_time_offset = 0.0;  ///< [s]
+  double camera_time_offset = 0.0;   ///< [s]
+  double encoder_time_offset = 0.0;  ///< [s]
+  double laser_time_offset = 0.0;    ///< [s]
   /// What the accelerometer's true bias is larger by [m/s^2]: a rig with such errors has one that nobody removed.
   Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();
 };
@@ -40,8 +42,9 @@ struct CalibrationErrors {
 /// Independent normal draws, of a random stream that nothing else uses. One sigma at factor 1: cameras to body 0.2
 /// degrees and 1 mm, right camera against left 0.02 degrees and 0.05 mm, focal lengths 0.1 %, principal points 0.5 px,
 /// wheel radius 0.4 % in common and 0.1 % between left and right, track width 0.5 %, odometer to body 0.3 degrees and
-/// 3 mm, beams 0.3 degrees and 2 mm, camera-IMU time 2 ms. The accelerometer's bias at the start is then one of 0.08
-/// m/s^2 per axis in all, 0.03 of it from draw_imu_biases(). Another factor scales all of them; 0 is no error.
+/// 3 mm, beams 0.3 degrees and 2 mm, times of cameras, encoders and lasers 2 ms each. The accelerometer's bias at the
+/// start is then one of 0.08 m/s^2 per axis in all, 0.03 of it from draw_imu_biases(). Another factor scales all of
+/// them; 0 is no error.
 [[nodiscard]] CalibrationErrors draw_calibration_errors(std::uint64_t seed, double factor);
 
 /// The true calibration with these errors in it.

@@ -29,6 +29,7 @@ void Wheels::update(const WheelIncrement& increment, const Context& context, Ekf
   MeanRate rate = context.imu.mean_rate(increment.from_ns, increment.to_ns);
   rate.noise_factor *= context.gyro_noise;
   WheelRows rows = linearize_wheels(x, motion.R_WB, motion.v_W, increment, rate.gyro_B, config_.model, sees_ground_);
+  show_time_offset(rows, increment, ekf);
   path_noise_.add(rows.rim_speed, increment);
   turn_noise_.add(rows.turning, increment);
   Sigmas sigma =
@@ -105,6 +106,14 @@ Wheels::Sigmas Wheels::noise_of(const WheelRows& rows, const WheelIncrement& inc
   return sigma;
 }
 
+/// A reading of another moment shows the speed then. A yaw rate that changes is left out.
+void Wheels::show_time_offset(WheelRows& rows, const WheelIncrement& increment, const Ekf& ekf) {
+  const double predicted = rows.rim_speed - rows.residual(WheelRows::speed);
+  const double sigma = std::sqrt(ekf.covariance().variance(rows.H.row(WheelRows::speed), err::nu));
+  rows.H(WheelRows::speed, ground_column(err::encoder_offset)) =
+      running_.speed_change.add(predicted, sigma, increment.duration());
+}
+
 /// A reading that the state has passed is compared with the velocity then, taken back by the inertial samples.
 void Wheels::add_delay(Sigmas& sigma, const WheelIncrement& increment, const Ekf& ekf) {
   const double tilt = std::sqrt(ekf.covariance().matrix().diagonal().segment<2>(err::theta).maxCoeff());
@@ -149,7 +158,8 @@ Displacement Wheels::displacement(const Ekf& ekf, const WheelIncrements& increme
   Displacement result;
   const State& x = ekf.state();
   WheelIncrement whole{x.imu.t_ns, to_ns};
-  const bool complete = for_each_part(increments, whole.from_ns, to_ns, [&](const IncrementPart& part) {
+  const auto stamp = [&x](TimeNs t_ns) { return later_by(-x.odometer.time_offset, t_ns); };
+  const bool complete = for_each_part(increments, stamp(whole.from_ns), stamp(to_ns), [&](const IncrementPart& part) {
     whole.angle += part.angle;
     return true;
   });

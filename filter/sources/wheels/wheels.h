@@ -15,6 +15,7 @@
 #include "filter/ingest/imu_buffer.h"
 #include "filter/sources/wheels/mounting_watch.h"
 #include "filter/sources/wheels/reading_noise.h"
+#include "filter/sources/wheels/speed_change.h"
 #include "filter/sources/wheels/wheel_rows.h"
 
 namespace ear {
@@ -60,6 +61,7 @@ class Wheels {
   /// `usual_dt` [s]: of increments like this one.
   [[nodiscard]] Sigmas noise_of(const WheelRows& rows, const WheelIncrement& increment, const MeanRate& rate,
                                 const State& x, double usual_dt) const;
+  void show_time_offset(WheelRows& rows, const WheelIncrement& increment, const Ekf& ekf);
   static void add_delay(Sigmas& sigma, const WheelIncrement& increment, const Ekf& ekf);
   void score_wheels(WheelRows& rows, Sigmas& sigma, const WheelIncrement& increment, const Context& context,
                     const Ekf& ekf, Records& records);
@@ -67,6 +69,7 @@ class Wheels {
 
   /// What the last increments have shown.
   struct Running {
+    SpeedChange speed_change;                     ///< of the rims against the body, as the state predicts it
     std::array<NoiseScore, 2> wheel;              ///< left, right
     std::array<NoiseScore, WheelRows::size> row;  ///< of all but the speed, which is the wheels'
     std::optional<TimeNs> lifted_ns;              ///< when the velocity last did not lie in the ground
