@@ -103,8 +103,7 @@ std::optional<Measurement> Ingest::next(TimeNs t_ns, double encoder_offset) {
   measurement.t_ns = wheels_next ? wheels_at() : ranges_.front().t_ns;
   if (measurement.t_ns > t_ns) return std::nullopt;
   if (wheels_next) {
-    passed_increment_ = increments_.front();
-    measurement.increment = later_by(encoder_offset, *passed_increment_);
+    measurement.increment = passed_increment_ = increments_.front();
     increments_.pop();
   } else {
     measurement.ranges = ranges_.front();

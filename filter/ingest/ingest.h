@@ -24,8 +24,8 @@ namespace ear {
 
 /// One reading of wheels or lasers whose time has come: exactly one of the two.
 struct Measurement {
-  TimeNs t_ns = 0;  ///< the middle of the increment, or the time of the ranges
-  std::optional<WheelIncrement> increment;
+  TimeNs t_ns = 0;                          ///< when its middle was, or the time of the ranges
+  std::optional<WheelIncrement> increment;  ///< as stamped
   BeamRanges ranges;
 };
 

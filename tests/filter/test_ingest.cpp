@@ -207,7 +207,7 @@ TEST_CASE("ingest: readings come at their stamps plus the encoders' offset, in t
       REQUIRE(next);
       CHECK(next->increment.has_value() != (i == (offset > 0.0 ? 0 : 2)));
       if (!next->increment) continue;
-      CHECK(next->t_ns == middle_of(*next->increment));
+      CHECK(next->t_ns == later_by(offset, middle_of(*next->increment)));
       wheels.push_back(next->t_ns);
     }
     const TimeNs moved = later_by(offset, TimeNs{0});

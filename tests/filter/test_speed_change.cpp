@@ -59,12 +59,10 @@ Found found(const Motion& motion, double late) {
   double before = 0.0;
   for (double t = 0.2; t < 19.9; t += kPeriod) {
     const double reading = motion.path(t) / kRadius + noise(rng);
-    const double offset = ekf.state().odometer.time_offset + late;  // what the filter's clock is off by
-    const WheelIncrement increment{at(t - kPeriod + offset), at(t + offset),
-                                   Eigen::Vector2d::Constant(reading - before)};
+    const WheelIncrement increment{at(t - kPeriod + late), at(t + late), Eigen::Vector2d::Constant(reading - before)};
     before = reading;
     if (t < 0.2 + kPeriod) continue;
-    ekf.propagate(imu, middle_of(increment), {}, 0.0);
+    ekf.propagate(imu, middle_of(later_by(ekf.state().odometer.time_offset, increment)), {}, 0.0);
     wheels.update(increment, {imu}, ekf, records);
   }
   return {ekf.state().odometer.time_offset,

@@ -22,16 +22,17 @@ Wheels::Wheels(const OdometerConfig& config, const Calibration& calibration, boo
       sees_ground_(sees_ground),
       mounting_(config, *calibration.encoder) {}
 
-void Wheels::update(const WheelIncrement& increment, const Context& context, Ekf& ekf, Records& records) {
+void Wheels::update(const WheelIncrement& stamped, const Context& context, Ekf& ekf, Records& records) {
   const State& x = ekf.state();
+  const WheelIncrement increment = later_by(x.odometer.time_offset, stamped);
   const BodyMotion motion = motion_at(middle_of(increment), x.imu, context.imu);
-  mounting_.add(increment, context.imu, x.imu.b_g, motion.R_WB.transpose() * Eigen::Vector3d::UnitZ());
+  mounting_.add(stamped, context.imu, x.imu.b_g, motion.R_WB.transpose() * Eigen::Vector3d::UnitZ());
   MeanRate rate = context.imu.mean_rate(increment.from_ns, increment.to_ns);
   rate.noise_factor *= context.gyro_noise;
   WheelRows rows = linearize_wheels(x, motion.R_WB, motion.v_W, increment, rate.gyro_B, config_.model, sees_ground_);
   show_time_offset(rows, increment, ekf);
-  path_noise_.add(rows.rim_speed, increment);
-  turn_noise_.add(rows.turning, increment);
+  path_noise_.add(rows.rim_speed, stamped);
+  turn_noise_.add(rows.turning, stamped);
   Sigmas sigma =
       noise_of(rows, increment, rate, x, encoder_.rate_hz > 0.0 ? 1.0 / encoder_.rate_hz : increment.duration());
   add_delay(sigma, increment, ekf);
@@ -109,7 +110,8 @@ Wheels::Sigmas Wheels::noise_of(const WheelRows& rows, const WheelIncrement& inc
 /// A reading of another moment shows the speed then. A yaw rate that changes is left out.
 void Wheels::show_time_offset(WheelRows& rows, const WheelIncrement& increment, const Ekf& ekf) {
   const double predicted = rows.rim_speed - rows.residual(WheelRows::speed);
-  const double sigma = std::sqrt(ekf.covariance().variance(rows.H.row(WheelRows::speed), err::nu));
+  const Eigen::Matrix<double, 1, kGroundColumns> h = rows.H.row(WheelRows::speed);
+  const double sigma = std::sqrt(ekf.covariance().variance(h, err::nu));
   rows.H(WheelRows::speed, ground_column(err::encoder_offset)) =
       running_.speed_change.add(predicted, sigma, increment.duration());
 }
