@@ -21,6 +21,8 @@ constexpr double kReading = 2e-4;  // [rad]
 
 TimeNs at(double t) { return kStart + static_cast<TimeNs>(std::llround(1e9 * t)); }
 
+WheelIncrement increment(int i) { return {at(kPeriod * i), at(kPeriod * (i + 1)), {}}; }
+
 /// A vehicle that drives straight on; v(t) and its derivative.
 struct Motion {
   double mean = 0.0, swing = 0.0;  // [m/s]
@@ -59,11 +61,11 @@ Found found(const Motion& motion, double late) {
   double before = 0.0;
   for (double t = 0.2; t < 19.9; t += kPeriod) {
     const double reading = motion.path(t) / kRadius + noise(rng);
-    const WheelIncrement increment{at(t - kPeriod + late), at(t + late), Eigen::Vector2d::Constant(reading - before)};
+    const WheelIncrement stamped{at(t - kPeriod + late), at(t + late), Eigen::Vector2d::Constant(reading - before)};
     before = reading;
     if (t < 0.2 + kPeriod) continue;
-    ekf.propagate(imu, middle_of(later_by(ekf.state().odometer.time_offset, increment)), {}, 0.0);
-    wheels.update(increment, {imu}, ekf, records);
+    ekf.propagate(imu, middle_of(later_by(ekf.state().odometer.time_offset, stamped)), {}, 0.0);
+    wheels.update(stamped, {imu}, ekf, records);
   }
   return {ekf.state().odometer.time_offset,
           std::sqrt(ekf.covariance().matrix()(err::encoder_offset, err::encoder_offset))};
@@ -74,14 +76,20 @@ Found found(const Motion& motion, double late) {
 TEST_CASE("speed change: that of a speed that grows evenly, and none of one that is constant or uncertain") {
   SpeedChange change;
   double last = 0.0;
-  for (int i = 0; i < 500; ++i) last = change.add(0.5 + 0.8 * kPeriod * i, 1e-3, kPeriod);
+  for (int i = 0; i < 500; ++i) last = change.add(0.5 + 0.8 * kPeriod * i, 1e-3, increment(i));
   CHECK(last == about(0.8, 0.03));
-  for (int i = 0; i < 500; ++i) last = change.add(4.5, 1e-3, kPeriod);
+  for (int i = 500; i < 1000; ++i) last = change.add(4.5, 1e-3, increment(i));
   CHECK(last == 0.0);
 
   SpeedChange uncertain;
-  for (int i = 0; i < 500; ++i) last = uncertain.add(0.5 + 0.8 * kPeriod * i, 0.2, kPeriod);
+  for (int i = 0; i < 500; ++i) last = uncertain.add(0.5 + 0.8 * kPeriod * i, 0.2, increment(i));
   CHECK(last == 0.0);
+}
+
+TEST_CASE("speed change: nothing is known of it across a gap, as while a vehicle flies") {
+  SpeedChange change;
+  for (int i = 0; i < 100; ++i) change.add(0.5, 1e-3, increment(i));
+  for (int i = 300; i < 310; ++i) CHECK(change.add(1.5, 1e-3, increment(i)) == 0.0);
 }
 
 TEST_CASE("speed change: readings that are stamped late, or early, show by how much") {

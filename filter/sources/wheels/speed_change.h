@@ -3,9 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 
 #include "filter/ingest/limits.h"
+#include "filter/ingest/wheel_increment.h"
 
 namespace ear {
 
@@ -14,16 +14,18 @@ namespace ear {
 /// and would be taken for a time.
 class SpeedChange {
  public:
-  /// The predicted speed [m/s], its standard deviation and how long it lasted [s]; the change [m/s^2].
-  double add(double speed, double sigma, double dt) {
-    recent_ = recent_.value_or(speed);
-    *recent_ += std::min(1.0, dt / kStale) * (speed - *recent_);
-    const double change = speed - *recent_;
+  /// The speed predicted of an increment, as stamped, and its standard deviation [m/s]; the change [m/s^2].
+  double add(double speed, double sigma, const WheelIncrement& increment) {
+    if (increment.from_ns != last_ns_) recent_ = speed;
+    last_ns_ = increment.to_ns;
+    recent_ += std::min(1.0, increment.duration() / kStale) * (speed - recent_);
+    const double change = speed - recent_;
     return std::abs(change) > kClear * sigma ? change / kStale : 0.0;
   }
 
  private:
-  std::optional<double> recent_;  ///< [m/s]
+  TimeNs last_ns_ = 0;
+  double recent_ = 0.0;  ///< since readings follow one another [m/s]
 };
 
 }  // namespace ear

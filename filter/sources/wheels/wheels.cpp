@@ -30,7 +30,7 @@ void Wheels::update(const WheelIncrement& stamped, const Context& context, Ekf& 
   MeanRate rate = context.imu.mean_rate(increment.from_ns, increment.to_ns);
   rate.noise_factor *= context.gyro_noise;
   WheelRows rows = linearize_wheels(x, motion.R_WB, motion.v_W, increment, rate.gyro_B, config_.model, sees_ground_);
-  show_time_offset(rows, increment, ekf);
+  show_time_offset(rows, stamped, ekf);
   path_noise_.add(rows.rim_speed, stamped);
   turn_noise_.add(rows.turning, stamped);
   Sigmas sigma =
@@ -108,12 +108,11 @@ Wheels::Sigmas Wheels::noise_of(const WheelRows& rows, const WheelIncrement& inc
 }
 
 /// A reading of another moment shows the speed then. A yaw rate that changes is left out.
-void Wheels::show_time_offset(WheelRows& rows, const WheelIncrement& increment, const Ekf& ekf) {
+void Wheels::show_time_offset(WheelRows& rows, const WheelIncrement& stamped, const Ekf& ekf) {
   const double predicted = rows.rim_speed - rows.residual(WheelRows::speed);
   const Eigen::Matrix<double, 1, kGroundColumns> h = rows.H.row(WheelRows::speed);
   const double sigma = std::sqrt(ekf.covariance().variance(h, err::nu));
-  rows.H(WheelRows::speed, ground_column(err::encoder_offset)) =
-      running_.speed_change.add(predicted, sigma, increment.duration());
+  rows.H(WheelRows::speed, ground_column(err::encoder_offset)) = running_.speed_change.add(predicted, sigma, stamped);
 }
 
 /// A reading that the state has passed is compared with the velocity then, taken back by the inertial samples.

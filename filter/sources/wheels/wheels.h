@@ -61,7 +61,7 @@ class Wheels {
   /// `usual_dt` [s]: of increments like this one.
   [[nodiscard]] Sigmas noise_of(const WheelRows& rows, const WheelIncrement& increment, const MeanRate& rate,
                                 const State& x, double usual_dt) const;
-  void show_time_offset(WheelRows& rows, const WheelIncrement& increment, const Ekf& ekf);
+  void show_time_offset(WheelRows& rows, const WheelIncrement& stamped, const Ekf& ekf);
   static void add_delay(Sigmas& sigma, const WheelIncrement& increment, const Ekf& ekf);
   void score_wheels(WheelRows& rows, Sigmas& sigma, const WheelIncrement& increment, const Context& context,
                     const Ekf& ekf, Records& records);
