@@ -52,10 +52,17 @@ class Copy:
             if (self.mav0 / sensor / "data.csv").exists():
                 self.write(sensor, function(self.rows(sensor)))
 
-    def set_rate(self, sensor, divided_by):
+    def change_value(self, sensor, key, function):
+        """A number in sensor.yaml, if it is there, becomes `function` of what it was. Returns that."""
         path = self.mav0 / sensor / "sensor.yaml"
         text = path.read_text(encoding="utf-8")
-        path.write_text(re.sub(r"rate_hz: *([0-9.]+)", lambda m: f"rate_hz: {float(m[1]) / divided_by:g}", text), encoding="utf-8")
+        pattern = key + r": *([0-9.]+)"
+        path.write_text(re.sub(pattern, lambda m: f"{key}: {function(float(m[1])):g}", text), encoding="utf-8")
+        found = re.search(pattern, text)
+        return float(found[1]) if found else None
+
+    def set_rate(self, sensor, divided_by):
+        self.change_value(sensor, "rate_hz", lambda rate: rate / divided_by)
 
 
 def each_value(columns, function):
@@ -150,12 +157,8 @@ def scattered_readings(rows):
 
 def coarse_wheels(copy):
     """An encoder of 360 counts a turn; sensor.yaml says so."""
-    path = copy.mav0 / WHEELS / "sensor.yaml"
-    text = path.read_text(encoding="utf-8")
-    resolution, noise = (float(re.search(key + r": *([0-9.]+)", text)[1]) for key in ("resolution", "noise_counts"))
-    coarser = 360 / resolution
-    text = re.sub(r"resolution: *[0-9.]+", "resolution: 360", text)
-    path.write_text(re.sub(r"noise_counts: *[0-9.]+", f"noise_counts: {max(1.0, noise * coarser):g}", text), encoding="utf-8")
+    coarser = 360 / copy.change_value(WHEELS, "resolution", lambda _: 360)
+    copy.change_value(WHEELS, "noise_counts", lambda noise: max(1.0, noise * coarser))
     copy.change([WHEELS], lambda rows: [[time, *(str(math.floor(int(count) * coarser)) for count in counts)] for time, *counts in rows])
 
 

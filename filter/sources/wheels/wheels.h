@@ -34,7 +34,7 @@ class Wheels {
     double gyro_noise = 1.0;  ///< times the stated one
     bool stands = false;
   };
-  /// The filter's state is near the middle of the increment, or has passed it.
+  /// The filter's state is near the middle of the increment, or has passed it. `stamped`: by the encoders' own clock.
   void update(const WheelIncrement& stamped, const Context& context, Ekf& ekf, Records& records);
 
   /// p^o of (13): how far the body will have gone at `to_ns`. Not available without the ground's normal, if it counts.
