@@ -64,7 +64,8 @@ class Estimator {
   virtual std::optional<Estimate> process(const FeatureFrame& frame) = 0;
 
   /// The same at a time without an image, from all other sensors; a camera's stamp. Tracks go on over it. Nothing where
-  /// these show nothing: with cameras, off the ground. Images that come late can then still be used.
+  /// these show nothing: with cameras, off the ground. Images that come late can then still be used. Nothing either
+  /// while the newest inertial samples may be a spike.
   virtual std::optional<Estimate> process_without_image(TimeNs t_ns) = 0;
 
   /// The newest state carried on by the samples to `t_ns` (IMU time). Nothing before the start, while lost, and later

@@ -13,6 +13,7 @@ Filter::Filter(const FilterConfig& config, const Calibration& calibration)
 // ---- What happens to a frame
 
 std::optional<Estimate> Filter::process(const FeatureFrame& given) {
+  if (sources_.shows_nothing(given, ekf_)) return process_without_image(given.t_ns);
   const FrameStamp stamp = check_stamp(given.t_ns);
   if (stamp == FrameStamp::no_samples) refuse_frame();
   if (stamp != FrameStamp::usable) return std::nullopt;
@@ -33,6 +34,7 @@ std::optional<Estimate> Filter::process(const FeatureFrame& given) {
 std::optional<Estimate> Filter::process_without_image(TimeNs t_ns) {
   if (check_stamp(t_ns) != FrameStamp::usable) return std::nullopt;
   if (sources_.cameras().count() > 0 && !sources_.on_ground()) return std::nullopt;
+  if (ingest_.waits_for_imu(ekf_.time())) return std::nullopt;
   propagate_to(FeatureFrame{t_ns, {}});
   if (ekf_.running()) {
     sources_.update(nullptr, sources_.standstill().stands(), advice(), ekf_, records_);

@@ -52,6 +52,7 @@ Smoother::Smoother(const FilterConfig& config, const Calibration& calibration)
 // ---- What happens to a frame
 
 std::optional<Estimate> Smoother::process(const FeatureFrame& given) {
+  if (sources_.shows_nothing(given, ekf_)) return process_without_image(given.t_ns);
   const FrameStamp stamp = check_stamp(given.t_ns);
   if (stamp == FrameStamp::no_samples) refuse_frame();
   if (stamp != FrameStamp::usable) return std::nullopt;
@@ -61,6 +62,7 @@ std::optional<Estimate> Smoother::process(const FeatureFrame& given) {
 
 std::optional<Estimate> Smoother::process_without_image(TimeNs t_ns) {
   if (check_stamp(t_ns) != FrameStamp::usable || (window_ && !sources_.on_ground())) return std::nullopt;
+  if (ingest_.waits_for_imu(ekf_.time())) return std::nullopt;
   move_to(FeatureFrame{t_ns, {}}, false);
   return report(false, FrameAgreement{});
 }

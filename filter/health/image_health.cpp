@@ -43,7 +43,7 @@ bool ImageHealth::check(const FrameAgreement& seen, TimeNs t_ns) {
   stamps_.add(t_ns);
   const bool elsewhere = seen.matches > 0 && seen.left > kMajority;
   stamps_wrong_ = stamps_.unusual() && (stamps_wrong_ || elsewhere);
-  return !seen.frozen && !crossed(seen) && !stamps_wrong_;
+  return !crossed(seen) && !stamps_wrong_;
 }
 
 void ImageHealth::add(TimeNs t_ns, bool running, const FrameAgreement& seen, const FrameStatistics& statistics) {
@@ -79,7 +79,7 @@ void ImageHealth::judge(TimeNs t_ns, bool running, const FrameAgreement& seen, c
     const bool one_eyed = statistics.stereo < kSparse * tracks;
     right_.add(poor || one_eyed || (known && seen.right > kSomeOff), t_ns);
   }
-  if (seen.frozen || crossed(seen)) report(t_ns);
+  if (crossed(seen)) report(t_ns);
 }
 
 void ImageHealth::add_silence(TimeNs t_ns) {

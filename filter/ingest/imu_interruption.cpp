@@ -6,11 +6,6 @@
 #include "filter/ingest/limits.h"
 
 namespace ear {
-namespace {
-
-constexpr double kSettles = 0.07;  // [s] chosen: two frames at 30 Hz after a bridge
-
-}  // namespace
 
 /// A gap that the state has not passed yet grows by the next one.
 void ImuInterruption::add_gap(TimeNs from_ns, TimeNs to_ns, const Unseen& unseen) {
@@ -48,7 +43,7 @@ bool ImuInterruption::take_uncertain() {
 bool ImuInterruption::waits_for_images(TimeNs t_ns) const {
   const auto since = [t_ns](TimeNs from_ns) { return seconds_between(from_ns, t_ns); };
   return (gap_ && since(gap_->from_ns) > 0.0) || (uncertain_since_ns_ && since(*uncertain_since_ns_) < kStreamGap) ||
-         (bridged_ns_ && since(*bridged_ns_) < kSettles);
+         (bridged_ns_ && since(*bridged_ns_) < kSilent);
 }
 
 }  // namespace ear

@@ -11,6 +11,7 @@ namespace {
 // Chosen: of the deviation, between the samples of a spike, and between those before and after it; half a sine over
 // three samples differs by 0.4.
 constexpr double kAlike = 0.25;
+constexpr double kShortestStrike = 0.0125;  // [s] chosen: of one that is seen by two samples or fewer
 
 /// What a line leaves of the integral over so many intervals of a random walk that is known at both ends, `q` being the
 /// variance of a step: the variance of each of the samples that share it.
@@ -20,45 +21,72 @@ double left_by_line(double q, double intervals, double samples) {
 
 }  // namespace
 
-bool SpikeWatch::add(ImuBuffer& samples, double dt, bool clips) {
+bool SpikeWatch::add(ImuBuffer& samples, double dt, int lost, bool clips) {
   const Eigen::Vector3d value = samples.entry(0).sample.*value_;
   const Eigen::Vector3d before = samples.entry(length_ + 1).sample.*value_;
-  const Eigen::Vector3d change = value - (length_ > 0 ? measured_[length_ - 1] : before);
-  const double step = change.norm();
+  const Eigen::Vector3d change = value - (in_doubt() ? measured_[length_ - 1] : before);
   const double spread = kClear * std::sqrt(step_variance_);
   const double limit = std::max({least_, least_rate_ * dt, spread});
-  const double counted = std::min(step, limit);
-  step_variance_ += (1.0 - std::exp(-dt / kStreamGap)) * (counted * counted - step_variance_);
-  const Eigen::Vector3d counted_change = step > limit ? Eigen::Vector3d(change * (limit / step)) : change;
-  shared_ += (1.0 - std::exp(-dt / kNoiseMemory)) * (counted_change.dot(last_change_) - shared_);
-  last_change_ = counted_change;
+  const bool jumps = change.norm() > limit;
 
-  if (length_ > 0) {
+  if (in_doubt()) {
+    lost_ += static_cast<std::size_t>(lost);
+    doubtful_ += dt;
     const double off = (measured_[length_ - 1] - before).norm();
-    if (step > limit && (value - before).norm() <= kAlike * off) {
-      replace(samples, strikes_ && length_ == 2);
+    if (jumps && lost_ <= kLongest && (value - before).norm() <= kAlike * off) {
+      replace(samples);
+      last_change_.reset();
       return true;
     }
-    const bool strike = strikes_ && (clips || (value - measured_[0]).norm() > kAlike * off);
-    if (length_ == kLongest || strike) give_up(samples);
+    const bool strike = strikes_ && (value - measured_[0]).norm() > kAlike * off;
+    if (length_ == kLongest || lost_ > kLongest || strike) {
+      give_up(samples);
+      count(limit, doubtful_);
+    }
   }
-  const bool begins = step > limit && samples.entry(1).noise.*factor_ == 1.0 && !(strikes_ && clips);
-  if (length_ == 0 && !begins) return false;
-  measured_[length_++] = value;
+  if (!in_doubt() && lost > 0) {
+    cross(samples, dt, lost);
+    return false;
+  }
+
+  if (!jumps) {
+    count(change.norm(), dt);
+    if (last_change_) shared_ += (1.0 - std::exp(-dt / kNoiseMemory)) * (change.dot(*last_change_) - shared_);
+  }
+  last_change_ = jumps ? std::nullopt : std::optional(change);
+  const bool begins = jumps && samples.entry(1).noise.*factor_ == 1.0;
+  if (in_doubt() || begins) {
+    hold(samples, dt, clips);
+  } else if (jumps) {
+    count(limit, dt);
+  }
+  return false;
+}
+
+/// The newest sample may be part of a spike: the value before it is held.
+void SpikeWatch::hold(ImuBuffer& samples, double dt, bool clips) {
+  if (!in_doubt()) {
+    clipped_ = false;
+    lost_ = 0;
+    doubtful_ = dt;
+  }
+  const Eigen::Vector3d before = samples.entry(length_ + 1).sample.*value_;
+  clipped_ = clipped_ || clips;
+  measured_[length_++] = samples.entry(0).sample.*value_;
   for (std::size_t i = strikes_ && length_ == 1 ? 1 : 0; i < length_; ++i) {
     ImuBuffer::Entry& held = samples.entry(length_ - 1 - i);
     const double coherent = std::sqrt(2.0 * static_cast<double>(i) + 1.0);
     held.sample.*value_ = before;
     held.noise.*factor_ = std::max(held.noise.*factor_, coherent * (measured_[i] - before).norm() / sigma_);
   }
-  return false;
 }
 
 /// Between the samples before and after a spike the body did what it did in the recent past: a random walk with its
 /// steps, known at both ends. What that leaves of the integral over n samples has the variance q (n + 1)^3 / 12, q of a
-/// step. To this comes what the samples of the spike do not agree about; `in_doubt` all of them: two samples of a
-/// strike may be alike by chance.
-void SpikeWatch::replace(ImuBuffer& samples, bool in_doubt) {
+/// step. To this comes what the samples of the spike do not agree about. One or two may be true in a strike that fits
+/// in between, and more if they are alike because they are clipped: then the sum of n has the standard deviation of n
+/// of them.
+void SpikeWatch::replace(ImuBuffer& samples) {
   const auto n = static_cast<double>(length_);
   const Eigen::Vector3d before = samples.entry(length_ + 1).sample.*value_;
   const Eigen::Vector3d slope = (samples.entry(0).sample.*value_ - before) / (n + 1.0);
@@ -69,8 +97,10 @@ void SpikeWatch::replace(ImuBuffer& samples, bool in_doubt) {
     mean += (measured_[i] - crossed) / n;
     square += (measured_[i] - crossed).cwiseAbs2() / n;
   }
-  const double disagreement = square.sum() - (in_doubt ? 0.0 : mean.squaredNorm());
-  const double variance = (left_by_line(step_variance_, n + 1.0, n) + disagreement) / 3.0;
+  const bool unresolved = length_ <= 2 && doubtful_ > kShortestStrike;
+  const bool may_be_true = strikes_ && (unresolved || clipped_);
+  const double disagreement = may_be_true ? n * square.sum() : square.sum() - mean.squaredNorm();
+  const double variance = (left_by_line(step_variance_, n + static_cast<double>(lost_) + 1.0, n) + disagreement) / 3.0;
   for (std::size_t i = 0; i < length_; ++i) {
     samples.entry(length_ - i).noise.*factor_ = std::max(1.0, std::sqrt(variance) / sigma_);
   }
@@ -80,28 +110,26 @@ void SpikeWatch::replace(ImuBuffer& samples, bool in_doubt) {
 /// As in a spike: what the line leaves of the integral over n samples lies between two that were measured. The step
 /// across them says as much of the walk as those before.
 void SpikeWatch::cross(ImuBuffer& samples, double dt, int lost) {
-  give_up(samples);
   const double n = lost;
-  const double step = (samples.entry(0).sample.*value_ - samples.entry(1).sample.*value_).squaredNorm() / (n + 1.0);
-  const double variance = left_by_line(std::max(step_variance_, step), n + 1.0, n + 2.0) / 3.0;
+  const double step = (samples.entry(0).sample.*value_ - samples.entry(1).sample.*value_).norm() / std::sqrt(n + 1.0);
+  const double variance = left_by_line(std::max(step_variance_, step * step), n + 1.0, n + 2.0) / 3.0;
   double& factor = samples.entry(0).noise.*factor_;
   factor = std::max(factor, std::sqrt(variance) / sigma_);
-  const double counted = std::min(step, kClear * kClear * step_variance_);
-  step_variance_ += (1.0 - std::exp(-dt / kStreamGap)) * (counted - step_variance_);
+  count(std::min(step, kClear * std::sqrt(step_variance_)), dt);
+  last_change_.reset();
 }
 
 double SpikeWatch::white() const { return std::max(1.0, std::sqrt(std::max(0.0, -shared_) / 3.0) / sigma_); }
 
 double SpikeWatch::held() const { return std::sqrt(step_variance_) / (3.0 * sigma_); }
 
+void SpikeWatch::count(double step, double seconds) {
+  step_variance_ += (1.0 - std::exp(-seconds / kStreamGap)) * (step * step - step_variance_);
+}
+
 void SpikeWatch::give_up(ImuBuffer& samples) {
   for (std::size_t i = 0; i < length_; ++i) samples.entry(length_ - i).sample.*value_ = measured_[i];
   length_ = 0;
-}
-
-void ImuSpikes::cross(ImuBuffer& samples, double dt, int lost) {
-  gyro_.cross(samples, dt, lost);
-  accel_.cross(samples, dt, lost);
 }
 
 void ImuSpikes::give_up(ImuBuffer& samples) {
@@ -120,8 +148,8 @@ void ImuSpikes::set_sigma(const SampleSigma& sigma) {
   accel_.set_sigma(sigma.accel);
 }
 
-ImuFault ImuSpikes::add(ImuBuffer& samples, double dt, bool accel_clips) {
-  return {gyro_.add(samples, dt, false), accel_.add(samples, dt, accel_clips)};
+ImuFault ImuSpikes::add(ImuBuffer& samples, double dt, int lost, bool accel_clips) {
+  return {gyro_.add(samples, dt, lost, false), accel_.add(samples, dt, lost, accel_clips)};
 }
 
 }  // namespace ear

@@ -6,6 +6,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstddef>
+#include <optional>
 
 #include "ear/calibration.h"
 #include "ear/filter_config.h"
@@ -40,11 +41,12 @@ class SpikeWatch {
         step_variance_(6.0 * sigma * sigma) {}
 
   void set_sigma(double sigma) { sigma_ = sigma; }
-  /// The newest of `samples` came `dt` [s] after the one before. Until its end is seen, a spike is held at the value
-  /// before it; from then on, a line crosses it. Did one end?
-  bool add(ImuBuffer& samples, double dt, bool clips);
-  /// Before the newest of `samples` so many were lost, in `dt` [s]: a line crosses them.
-  void cross(ImuBuffer& samples, double dt, int lost);
+  /// The newest of `samples` came `dt` [s] after the one before; between them `lost` did not come. Until its end is
+  /// seen, a spike is held at the value before it; from then on, a line crosses it, and what was lost in it. Did one
+  /// end? A line crosses what was lost elsewhere, too.
+  bool add(ImuBuffer& samples, double dt, int lost, bool clips);
+  /// Has one begun whose end was not seen yet?
+  [[nodiscard]] bool in_doubt() const { return length_ > 0; }
   /// Factor on the noise for each interval for which a sample's value is held: the variance of the integral of the walk
   /// over n intervals is q n^3 / 3.
   [[nodiscard]] double held() const;
@@ -58,17 +60,25 @@ class SpikeWatch {
  private:
   static constexpr std::size_t kLongest = 5;
 
-  void replace(ImuBuffer& samples, bool in_doubt);
+  void hold(ImuBuffer& samples, double dt, bool clips);
+  void replace(ImuBuffer& samples);
+  void cross(ImuBuffer& samples, double dt, int lost);
+  /// What the body did in so many seconds; nothing that a spike does.
+  void count(double step, double seconds);
 
   Value value_;
   Factor factor_;
   double sigma_, least_, least_rate_;
   bool strikes_;
-  double step_variance_;                                   ///< of the recent steps between samples, all axes together
-  Eigen::Vector3d last_change_ = Eigen::Vector3d::Zero();  ///< the step before the newest
-  double shared_ = 0.0;                                    ///< mean product of two steps in a row, all axes together
+  double step_variance_;                        ///< of the recent steps between samples, all axes together
+  std::optional<Eigen::Vector3d> last_change_;  ///< the step before the newest, if it was the body's
+  double shared_ = 0.0;                         ///< mean product of two steps in a row, all axes together
+  // What may be a spike:
   std::array<Eigen::Vector3d, kLongest> measured_;
   std::size_t length_ = 0;
+  std::size_t lost_ = 0;   ///< samples that did not come meanwhile
+  double doubtful_ = 0.0;  ///< [s] for so long
+  bool clipped_ = false;   ///< one of them
 };
 
 class ImuSpikes {
@@ -77,10 +87,11 @@ class ImuSpikes {
 
   /// Of the white noise of the samples that follow.
   void set_sigma(const SampleSigma& sigma);
-  /// What ended with the newest of `samples`, which came `dt` [s] after the one before. `accel_clips`: it is clipped.
-  ImuFault add(ImuBuffer& samples, double dt, bool accel_clips);
-  /// The newest came after a gap of `lost` samples, in `dt` [s].
-  void cross(ImuBuffer& samples, double dt, int lost);
+  /// What ended with the newest of `samples`, which came `dt` [s] after the one before, of those between them `lost`
+  /// not. `accel_clips`: it is clipped.
+  ImuFault add(ImuBuffer& samples, double dt, int lost, bool accel_clips);
+  /// May the newest samples be those of a spike?
+  [[nodiscard]] bool in_doubt() const { return gyro_.in_doubt() || accel_.in_doubt(); }
   /// Factors on the noise, per interval for which the values of a sample are held.
   [[nodiscard]] ImuNoiseFactors held() const { return {gyro_.held(), accel_.held()}; }
   /// Factor on the accelerometer's noise, 1 or more, as its samples show it.

@@ -61,10 +61,8 @@ ImuFault Ingest::store(const ImuSample& sample, const ImuVerdict& verdict) {
   ImuFault spike;
   if (imu_.size() == 1) {
     spikes_.give_up(imu_);
-  } else if (verdict.lost > 0) {
-    spikes_.cross(imu_, dt, verdict.lost);
   } else {
-    spike = spikes_.add(imu_, dt, impact_guard_.accel_clips());
+    spike = spikes_.add(imu_, dt, verdict.lost, impact_guard_.accel_clips());
   }
   const ImuNoiseFactors held = spikes_.held();
   imu_.set_walk({held.gyro / verdict.interval, held.accel / verdict.interval});
@@ -135,6 +133,10 @@ double Ingest::imu_interval() const {
 
 bool Ingest::covers(TimeNs imu_time_ns) const {
   return !imu_.empty() && seconds_between(imu_.newest().t_ns, imu_time_ns) < kClockJump;  // a driver may be held up
+}
+
+bool Ingest::waits_for_imu(std::optional<TimeNs> state_ns) const {
+  return state_ns && spikes_.in_doubt() && seconds_between(*state_ns, imu_.newest().t_ns) < kStreamGap;
 }
 
 InputCounts Ingest::counts() const {

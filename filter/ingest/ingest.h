@@ -77,6 +77,9 @@ class Ingest {
   [[nodiscard]] WheelIncrements increments() const { return {passed_increment_, increments_}; }
   [[nodiscard]] const Ring<WheelIncrement>& waiting_increments() const { return increments_; }
   [[nodiscard]] const ImuBuffer& imu() const { return imu_; }
+  /// Are the newest inertial samples in doubt? They may be those of a spike, whose end the next few show. A state that
+  /// goes on without an image waits for it: none would put right what it takes of them.
+  [[nodiscard]] bool waits_for_imu(std::optional<TimeNs> state_ns) const;
   /// Factor on the accelerometer's white noise, 1 or more, as its samples show it.
   [[nodiscard]] double white_accel() const { return spikes_.white_accel(); }
   [[nodiscard]] ImuInterruption& interruption() { return interruption_; }

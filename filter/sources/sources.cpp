@@ -37,11 +37,9 @@ void Sources::inflate_after_takeoff(Ekf& ekf) {
 void Sources::look_at(const FeatureFrame& frame, TimeNs t_ns, const Ingest& ingest, Ekf& ekf) {
   const bool stood = standstill_.stands();
   cameras_.measure_noise(frame, ekf.state().camera);
-  const FeatureFrame nothing{frame.t_ns, {}};
-  const bool repeated = frame.repeated && ekf.running();  // a frozen image shows no standing
   const ImuStatistics recent = standstill_.recent(ingest.imu(), t_ns);
-  standstill_.update({repeated ? nothing : frame, t_ns, recent,
-                      ekf.running() ? std::optional(ekf.state().imu.b_g) : std::nullopt, on_ground()});
+  const auto b_g = ekf.running() ? std::optional(ekf.state().imu.b_g) : std::nullopt;
+  standstill_.update({frame, t_ns, recent, b_g, on_ground()});
   if (standstill_.stands()) imu_score_.add_rest(recent, imu_);
   ground_.set_gyro_bias(ekf.state().imu.b_g);
   if (stood && !standstill_.stands() && ekf.running()) ekf.inflate_biases(kShakenGyro, kShakenAccel);
@@ -62,7 +60,7 @@ Displacements Sources::displacements(const FeatureFrame& frame, TimeNs t_ns, con
 
 void Sources::score_imu(const FeatureFrame& frame, const Consistency& consistency, const Ekf& ekf, Records& records) {
   const std::optional<StereoMotion>& seen = cameras_.seen();
-  if (!seen || frame.repeated || consistency.anomalous == MotionSensor::camera) return;
+  if (!seen || consistency.anomalous == MotionSensor::camera) return;
   const std::optional<Innovation> turn = imu_score_.add(motion_, *seen, ekf.covariance(), frame.t_ns);
   if (turn) records.log.add(Source::gyroscope, *turn, ekf.state().imu.t_ns);
 }
@@ -112,14 +110,13 @@ void Sources::propagate(TimeNs t_ns, const Advice& advice, Ingest& ingest, Ekf& 
 
 FrameAgreement Sources::check(const FeatureFrame& frame, Ingest& ingest, Ekf& ekf) {
   FrameAgreement seen;
-  if (ekf.running() && !frame.repeated) {
+  if (ekf.running()) {
     if (ingest.interruption().take_uncertain() && cameras_.bridge(frame, ekf)) {
       camera_update_ = CameraUpdate::considered;
       ingest.interruption().set_bridged(ekf.state().imu.t_ns);
     }
     seen = cameras_.compare(frame, ekf);
   }
-  seen.frozen = ekf.running() && frame.repeated;
   seen.right_skipped = frame.right_skipped;
   return seen;
 }

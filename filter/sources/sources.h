@@ -31,6 +31,11 @@ class Sources {
     return event;
   }
 
+  /// Does the image repeat the one before, of a vehicle that moves? It shows nothing of now then, and is none: so a
+  /// driver makes a faster camera of a slow one. One that is stuck the health notices by its silence.
+  [[nodiscard]] bool shows_nothing(const FeatureFrame& frame, const Ekf& ekf) const {
+    return frame.repeated && ekf.running() && !standstill_.stands();
+  }
   /// A frame at `t_ns` (IMU time), before anything is done with it: how exact it is, and whether the vehicle stands.
   void look_at(const FeatureFrame& frame, TimeNs t_ns, const Ingest& ingest, Ekf& ekf);
   /// p^I, p^o and p^c of (13), from the state to `t_ns`, each by one sensor alone. `ground_known`: the state's normal

@@ -17,7 +17,8 @@ MovingStart::MovingStart(const FilterConfig& config, const Calibration& calibrat
              config.feature_sigma_px / focal_length(calibration)} {}
 
 void MovingStart::add(TimeNs t_ns, const FeatureFrame& frame, const ImuBuffer& imu) {
-  if (frame.repeated || (!frames_.empty() && seconds_between(frames_.back().t_ns, t_ns) >= kStale)) frames_.clear();
+  if (frame.repeated) return;
+  if (!frames_.empty() && seconds_between(frames_.back().t_ns, t_ns) >= kStale) frames_.clear();
   if (frames_.empty() && (imu.empty() || imu[0].t_ns > t_ns)) return;
   frames_.push_back({t_ns, frame});
   while (spans_enough(1)) frames_.erase(frames_.begin());

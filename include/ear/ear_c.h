@@ -216,13 +216,14 @@ void ear_default_start(ear_start* start);
 ear_result ear_start_at(ear_odometry* odometry, const ear_start* start, char* message, size_t message_size);
 
 /* Hands the waiting samples to the estimator, ordered by time, and then the oldest frame, once inertial samples reach
- * its time or all slots are taken. EAR_OK: *estimate is that frame's. EAR_NO_ESTIMATE: before the start, and of a frame
- * that is left out to keep ear_settings.budget_ms. Call it until it returns EAR_NOTHING; it never waits. */
+ * its time or all slots are taken. EAR_OK: *estimate is that frame's. EAR_NO_ESTIMATE: before the start, of a frame
+ * that is left out to keep ear_settings.budget_ms, and in flight of an image that repeats the one before to the byte.
+ * Call it until it returns EAR_NOTHING; it never waits. */
 ear_result ear_process(ear_odometry* odometry, ear_estimate* estimate);
 
 /* The estimate at a time without an image [ns, IMU time], from all other sensors; as Odometry::step() of
- * ear/odometry.h. EAR_NO_ESTIMATE with cameras, off the ground; see ear_predict(). Waiting samples up to that time are
- * handed over. */
+ * ear/odometry.h. EAR_NO_ESTIMATE with cameras, off the ground, and while inertial samples may be a spike; see
+ * ear_predict(). Waiting samples up to that time are handed over. */
 ear_result ear_step(ear_odometry* odometry, int64_t t_ns, ear_estimate* estimate);
 
 /* The newest state carried on to a time by the inertial samples that ear_process() and ear_step() took, at any rate.

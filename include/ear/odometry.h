@@ -45,12 +45,13 @@ class Odometry {
 
   /// The estimate at the frame's time, or nothing while the estimator cannot start (see status()). Inertial samples up
   /// to the frame's time should be there; where the last ones are missing, the newest one is held. Nothing either for a
-  /// frame that is left out to keep PerformanceConfig::budget_ms; predict() goes on.
+  /// frame that is left out to keep PerformanceConfig::budget_ms, or in flight for an image that repeats the one before
+  /// to the byte, which shows nothing new; predict() goes on.
   std::optional<Estimate> add_stereo(const StereoFrame& frame);
 
   /// The estimate at a time without an image [ns, IMU time], from all other sensors: for vehicles without a camera,
   /// while images do not come, and between them; tracks go on over it. Nothing with cameras, off the ground: see
-  /// predict().
+  /// predict(). Nor while the newest inertial samples, up to five, may be a spike: the next step counts them rightly.
   std::optional<Estimate> step(TimeNs t_ns);
 
   /// The newest state, carried on by the inertial samples since to `t_ns` (IMU time). Nothing before the start or lost.

@@ -25,15 +25,20 @@ class Stream {
   const ImuBuffer& samples() const { return ingest_.imu(); }
   std::uint64_t spikes() const { return ingest_.counts().imu_spikes; }
   double white_accel() const { return ingest_.white_accel(); }
+  bool in_doubt() const { return ingest_.waits_for_imu(t_ns_); }
   double gyro_sigma() const { return ImuCalibration{}.gyro_noise * std::sqrt(rate_); }
 
   ImuFault add(const Eigen::Vector3d& rate_B = Eigen::Vector3d::Zero(),
                const Eigen::Vector3d& force_B = Eigen::Vector3d::Zero()) {
     t_ns_ += std::llround(1e9 / rate_);
     const Eigen::Vector3d rest_B(0.0, 0.0, kGravity);
-    const ImuSample sample{t_ns_, rate_B + random(gyro_sigma()),
-                           rest_B + force_B + random(ImuCalibration{}.accel_noise * std::sqrt(rate_))};
-    return ingest_.store(sample, ingest_.judge(sample, true));
+    return store(rate_B + random(gyro_sigma()),
+                 rest_B + force_B + random(ImuCalibration{}.accel_noise * std::sqrt(rate_)));
+  }
+  /// Of the accelerometer, without noise.
+  void add_exactly(const Eigen::Vector3d& accel_B) {
+    t_ns_ += std::llround(1e9 / rate_);
+    store(random(gyro_sigma()), accel_B);
   }
   /// So many samples do not come.
   void lose(int count) { t_ns_ += count * std::llround(1e9 / rate_); }
@@ -54,8 +59,22 @@ class Stream {
     }
     return {rate, force};
   }
+  /// Largest factors on the noise between the last samples, of which `count` are inside.
+  ImuNoiseFactors largest_noise(int count) const {
+    ImuNoiseFactors largest{0.0, 0.0};
+    const TimeNs from_ns = samples()[samples().size() - 2 - static_cast<std::size_t>(count)].t_ns;
+    samples().for_each_piece(from_ns, samples().newest().t_ns,
+                             [&](const Eigen::Vector3d&, const Eigen::Vector3d&, double, const ImuNoiseFactors& noise) {
+                               largest = {std::max(largest.gyro, noise.gyro), std::max(largest.accel, noise.accel)};
+                             });
+    return largest;
+  }
 
  private:
+  ImuFault store(const Eigen::Vector3d& gyro_B, const Eigen::Vector3d& accel_B) {
+    const ImuSample sample{t_ns_, gyro_B, accel_B};
+    return ingest_.store(sample, ingest_.judge(sample, true));
+  }
   static Calibration calibration(double rate_hz) {
     Calibration calibration;
     calibration.imu.rate_hz = rate_hz;
@@ -131,14 +150,66 @@ TEST_CASE("imu spike: a change that lasts is given back, as it was measured, wit
   CHECK(stream.spikes() == 0);
 }
 
-TEST_CASE("imu spike: samples that are lost end what might have been one") {
+TEST_CASE("imu spike: samples that are lost within one belong to it, up to five") {
+  for (const int lost : {1, 5, 6}) {
+    CAPTURE(lost);
+    Stream stream;
+    stream.rest(1.0);
+    for (int i = 0; i < 2; ++i) stream.add(kTurn);
+    stream.lose(lost);
+    stream.add(kTurn);
+    CHECK(stream.add().gyro == (lost <= 5));
+    CHECK((stream.largest(4).first < 0.1) == (lost <= 5));
+  }
+}
+
+TEST_CASE("imu spike: it is in doubt until its end") {
   Stream stream;
   stream.rest(1.0);
-  stream.add(kTurn);
-  stream.lose(1);
-  CHECK_FALSE(stream.add().any());
-  CHECK(stream.spikes() == 0);
-  CHECK(stream.largest(2).first > 2.0);
+  CHECK_FALSE(stream.in_doubt());
+  for (int i = 0; i < 5; ++i) {
+    stream.add(kTurn, kForce);
+    CHECK(stream.in_doubt());
+  }
+  stream.add();
+  CHECK_FALSE(stream.in_doubt());
+  for (int i = 0; i < 5; ++i) stream.add(kTurn, kForce);
+  CHECK(stream.in_doubt());
+  stream.add(kTurn, kForce);
+  CHECK_FALSE(stream.in_doubt());  // it lasts
+}
+
+TEST_CASE("imu spike: what it did does not count as what the body does") {
+  for (const double rate_hz : {50.0, 200.0}) {
+    for (int length = 1; length <= 5; ++length) {
+      CAPTURE(rate_hz);
+      CAPTURE(length);
+      Stream stream(rate_hz);
+      stream.rest(2.0);
+      const double white = stream.white_accel();
+      for (int i = 0; i < length; ++i) stream.add(kTurn, kForce);
+      CHECK(stream.add().gyro);
+      // The walk has steps of sqrt(6) of a sample's noise, all axes together: 2 (n + 1)^3 / (12 n) of its variance.
+      const double n = length;
+      const double expected = std::sqrt(std::pow(n + 1.0, 3) / (6.0 * n));
+      CHECK(stream.largest_noise(length).gyro == about(expected, 0.3));
+      if (length > 2) CHECK(stream.largest_noise(length).accel == about(expected, 0.3));  // fewer may be a strike's
+      CHECK(stream.white_accel() == about(white, 0.1));
+    }
+  }
+}
+
+TEST_CASE(
+    "imu spike: equal samples may be those of a strike that is clipped, and keep all of their deviation as noise") {
+  // The sum of n with noise of their own has the standard deviation of n deviations.
+  Stream stream;
+  stream.rest(1.0);
+  const Eigen::Vector3d value = kForce + Eigen::Vector3d(0.0, 0.0, kGravity);
+  for (int i = 0; i < 4; ++i) stream.add_exactly(value);
+  CHECK(stream.add().accel);
+  CHECK(stream.largest(5).second < 2.0);
+  const double sigma = stream.largest_noise(4).accel * ImuCalibration{}.accel_noise * std::sqrt(200.0);
+  CHECK(std::sqrt(4.0) * sigma == about(4.0 * kForce.norm() / std::sqrt(3.0), 0.05));  // of one axis
 }
 
 /// Of the turn over so many intervals, of which only the ends were measured, or only the begin: its error's variance
@@ -216,18 +287,22 @@ TEST_CASE("imu spike: strikes of 10 to 50 ms are not taken for one") {
   }
 }
 
-TEST_CASE("imu spike: of two samples of the accelerometer that are alike, all of the deviation stays as noise") {
-  Stream stream;
-  stream.rest(1.0);
-  for (int i = 0; i < 2; ++i) stream.add(kNone, kForce);
-  CHECK(stream.add().accel);
-  double largest = 0.0;
-  stream.samples().for_each_piece(
-      stream.samples()[stream.samples().size() - 3].t_ns, stream.samples().newest().t_ns,
-      [&](const Eigen::Vector3d&, const Eigen::Vector3d&, double, const ImuNoiseFactors& noise) {
-        largest = std::max(largest, noise.accel * ImuCalibration{}.accel_noise * std::sqrt(200.0));
-      });
-  CHECK(largest > 0.9 * kForce.norm() / std::sqrt(3.0));  // of one axis
+TEST_CASE(
+    "imu spike: one or two samples of the accelerometer that may be a strike keep all of their deviation as noise") {
+  const auto share_kept = [](int length, double rate_hz) {  // in the sum
+    Stream stream(rate_hz);
+    stream.rest(1.0);
+    for (int i = 0; i < length; ++i) stream.add(kNone, kForce);
+    CHECK(stream.add().accel);
+    const double sigma = stream.largest_noise(length).accel * ImuCalibration{}.accel_noise * std::sqrt(rate_hz);
+    return std::sqrt(length) * sigma / (length * kForce.norm() / std::sqrt(3.0));  // of one axis
+  };
+  CHECK(share_kept(1, 50.0) == about(1.0, 0.05));
+  CHECK(share_kept(1, 100.0) == about(1.0, 0.05));
+  CHECK(share_kept(2, 200.0) == about(1.0, 0.05));
+  CHECK(share_kept(1, 200.0) < 0.1);  // a strike of 10 ms has two
+  CHECK(share_kept(2, 400.0) < 0.1);
+  CHECK(share_kept(3, 50.0) < 0.1);  // that are not alike
 }
 
 TEST_CASE("imu spike: fast turns that begin and end smoothly are none, nor is vibration") {

@@ -94,6 +94,43 @@ TEST_CASE("filter: standing for a minute it stays where it is") {
   CHECK(run.back().estimate.frame.clones <= 1);  // standing fills no window with copies
 }
 
+TEST_CASE("filter: cameras alone, images that are the same to the byte show that it stands still") {
+  const simulator::Simulation simulation = simulate("static", 15.0);
+  FilterConfig config;
+  config.odometer.model = OdometerModel::none;
+  Filter filter(config, simulation.calibration());
+  FeatureFrame first;
+  const auto run = run_filter(filter, simulation, [&](FeatureFrame& frame) {
+    if (first.features.empty()) first = frame;
+    frame.repeated = frame.t_ns != first.t_ns;
+    frame.features = first.features;
+  });
+  REQUIRE(run.size() > 400);
+  CHECK(run.back().estimate.frame.standing);
+  CHECK(run.back().dp_W.norm() < 0.005);
+  for (const EvaluatedEstimate& e : run) CHECK(e.estimate.health.status == HealthStatus::tracking);
+}
+
+TEST_CASE("filter: of a camera whose driver hands over each image twice, the second one is none") {
+  for (const char* sequence : {"flat1", "fly1"}) {
+    CAPTURE(sequence);
+    const simulator::Simulation simulation = simulate(sequence, 25.0);
+    Filter sound(FilterConfig{}, simulation.calibration());
+    const double largest = largest_error(run_filter(sound, simulation));
+    Filter filter(FilterConfig{}, simulation.calibration());
+    std::vector<FeatureObservation> last;
+    const auto run = run_filter(filter, simulation, [&](FeatureFrame& frame) {
+      frame.repeated = !frame.repeated && !last.empty();
+      if (frame.repeated) frame.features = last;
+      last = frame.repeated ? std::vector<FeatureObservation>{} : frame.features;
+    });
+    CHECK(run.size() > 300);
+    CHECK(run.back().t > 24.9);
+    CHECK(largest_error(run) < 1.5 * largest);
+    for (const EvaluatedEstimate& e : run) CHECK_FALSE(e.estimate.health.faulty.any());
+  }
+}
+
 TEST_CASE("filter: biases learned at rest are less certain once the vehicle moves and shakes") {
   const simulator::Simulation simulation = simulate("flat1", 4.0);
   Filter filter(FilterConfig{}, simulation.calibration());

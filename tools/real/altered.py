@@ -126,6 +126,18 @@ def noisy_imu(copy):
     copy.change(["imu0"], each_value(ACCEL, lambda x, _: x + draws.gauss(0.0, 0.5)))
 
 
+def spikes(rows):
+    """20 a minute, none within 0.1 s of another, of one to five samples that are off together."""
+    draws, at = random.Random(7), int(rows[0][0]) + 3 * 10**9
+    while at < int(rows[-1][0]):
+        first = next(i for i, row in enumerate(rows) if int(row[0]) >= at)
+        off = [0.0, *(draws.gauss(0.0, 3.0) for _ in GYRO), *(draws.gauss(0.0, 40.0) for _ in ACCEL)]
+        for row in rows[first : first + draws.randint(1, 5)]:
+            row[1:] = [repr(float(row[column]) + off[column]) for column in GYRO + ACCEL]
+        at += round(1e9 * (0.1 + draws.expovariate(1.0 / 2.9)))
+    return rows
+
+
 def lost_samples(copy):
     draws = random.Random(2)
     copy.change(["imu0"], lambda rows: [row for row in rows if draws.random() > 0.1])
@@ -185,6 +197,12 @@ def stuck_left_wheel(rows):
     return rows[:half] + [[row[0], rows[half][1], row[2]] for row in rows[half:]]
 
 
+def repeated_images(rows):
+    """A driver that makes two frames of each."""
+    later_rows = [[str((int(a[0]) + int(b[0])) // 2), *a[1:]] for a, b in zip(rows, rows[1:])]
+    return [row for pair in zip(rows, later_rows) for row in pair] + rows[-1:]
+
+
 def exchanged_images(copy):
     rows = {camera: copy.rows(camera) for camera in CAMERAS}
     folders = {camera: (copy.mav0 / camera / "data").resolve() for camera in CAMERAS}
@@ -212,6 +230,7 @@ ALTERATIONS = [
     Alteration("nothing", "as it is", lambda copy: None),
     Alteration("camera_half", "every other image", on(CAMERAS, every(2)), ("cam0",)),
     Alteration("camera_third", "every third image", on(CAMERAS, every(3)), ("cam0",)),
+    Alteration("camera_repeated", "each image comes twice, the second time half an interval later", on(CAMERAS, repeated_images), ("cam0",)),
     Alteration("camera_stamps", "stamps of the images scatter by 3 ms", scattered_stamps, ("cam0",)),
     Alteration("camera_ends", "no image in the second half", on(CAMERAS, without_part(0.5, 1.0)), ("cam0",)),
     Alteration("camera_gap", "no image in the third of five parts", on(CAMERAS, without_part(0.4, 0.6)), ("cam0",)),
@@ -226,6 +245,7 @@ ALTERATIONS = [
     Alteration("imu_late", "stamps of the inertial samples 20 ms late", on(["imu0"], later(0.02))),
     Alteration("imu_very_late", "the same by 100 ms", on(["imu0"], later(0.1))),
     Alteration("imu_noise", "white noise of 0.05 rad/s and 0.5 m/s^2 on each sample", noisy_imu),
+    Alteration("imu_spikes", "spikes of one to five inertial samples, 20 a minute, of 3 rad/s and 40 m/s^2 per axis", on(["imu0"], spikes)),
     Alteration("gyro_bias", "gyroscope's bias of 0.05 rad/s in roll and yaw",
                on(["imu0"], each_value((1, 3), lambda x, column: x + (0.05 if column == 3 else -0.05)))),
     Alteration("gyro_scale", "gyroscope that measures 1 % too much", on(["imu0"], each_value(GYRO, lambda x, _: 1.01 * x))),

@@ -3,6 +3,7 @@
 from real.catalogue import DATA_SETS, HELD
 from real.altered import table as altered_table
 from real.judge import table
+from real.miscalibrated import table as miscalibrated_table
 from real.reference import table as reference_table
 
 HEAD = """# Real recordings
@@ -13,7 +14,8 @@ This page is written by `tools/real_data report`; do not edit it.
     tools/real_data list                       # which there are, with licence and source
     tools/real_data convert euroc MH_01_easy   # a local copy of the original to our layout
     tools/real_data run                        # all in ../shared/data, or those named, by name or folder
-    tools/real_data alter                      # the same with something wrong in them (last section)
+    tools/real_data alter                      # the same with something wrong in them (section below)
+    tools/real_data miscalibrate               # the same with a calibration as wrong as on real rigs (section below)
     tools/real_data references                 # how good their truth is (section below)
     tools/real_data report
 
@@ -71,6 +73,13 @@ the position is far off. "none": no estimate, with a reason in words; empty: the
 """
 
 
+MISCALIBRATED = """## Calibration as wrong as on real rigs
+
+`tools/real_data miscalibrate`: 20 draws of errors in everything that sensor.yaml says of cameras, wheels and beams, and in their clocks, with the standard
+deviations of [`--calibration-error 1`](simulator.md). The calibration of `hop` is exact as it is; to those of the others these errors are added.
+"""
+
+
 REFERENCES = """## How good the truths are
 
 `tools/real_data references` judges each truth by the recording's own inertial samples and by itself; no estimate is in it. How much turns over a second
@@ -81,9 +90,10 @@ simulated: its row shows what the inertial samples' noise does. "-": no velociti
 """
 
 
-def page(results, altered=None, references=None):
+def page(results, altered=None, miscalibrated=None, references=None):
     return "\n".join([HEAD, table([(r["name"], r["figures"]) for r in results]), "", *notes(results), "",
                       *([ALTERED, altered_table(altered["results"], altered["names"]), ""] if altered else []),
+                      *([MISCALIBRATED, miscalibrated_table(miscalibrated), ""] if miscalibrated else []),
                       *([REFERENCES, reference_table(references), ""] if references else []), "## Data sets", "", data_sets(), "",
                       *lines_of("The converters read every row and name file, line and field of what is wrong; images are linked, not "
                                 "copied. That of comma2k19 makes, of the example segment in its repository, the recording above: the same "

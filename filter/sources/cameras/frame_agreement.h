@@ -14,7 +14,6 @@ struct FrameAgreement {
   double noise = 1.0;          ///< of the features, times the usual
   double behind = 0.0;         ///< share of the stereo features that the geometry puts behind the cameras
   bool right_skipped = false;  ///< nobody looked at that of the second camera
-  bool frozen = false;         ///< the image is exactly the one before
 
   /// Do the images contradict the state? Most features are off their place then.
   [[nodiscard]] bool contradicts() const { return left > kMajority; }
