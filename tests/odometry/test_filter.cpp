@@ -3,6 +3,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <limits>
+#include <random>
 
 #include "filter/filter.h"
 #include "tests/support/simulated_run.h"
@@ -129,6 +130,31 @@ TEST_CASE("filter: of a camera whose driver hands over each image twice, the sec
     CHECK(largest_error(run) < 1.5 * largest);
     for (const EvaluatedEstimate& e : run) CHECK_FALSE(e.estimate.health.faulty.any());
   }
+}
+
+TEST_CASE("filter: where the gate refuses most features of a frame, it uses none of them") {
+  const simulator::Simulation simulation = simulate("flat1", 14.0);
+  const TimeNs first_ns = simulation.frame_times().front();
+  Filter filter(FilterConfig{}, simulation.calibration());
+  std::mt19937_64 rng(52);
+  std::normal_distribution<double> off(0.0, 0.05);  // 20 pixels
+  const auto run = run_filter(filter, simulation, [&](FeatureFrame& frame) {
+    const double t = seconds_between(first_ns, frame.t_ns);
+    if (t < 8.0 || t > 9.0) return;
+    for (FeatureObservation& o : frame.features) {
+      o.has_right = false;  // else both cameras show how noisy the features are
+      if (o.id % 4 != 0) o.left += Eigen::Vector2d(off(rng), off(rng));
+    }
+  });
+  int refused = 0;
+  for (const EvaluatedEstimate& e : run) {
+    const FrameStatistics& seen = e.estimate.frame;
+    if (seen.features_used + seen.features_rejected < 10) continue;
+    CHECK((seen.features_used == 0 || seen.features_used >= seen.features_rejected));
+    refused += seen.features_used == 0 ? 1 : 0;
+  }
+  CHECK(refused > 5);
+  CHECK(run.back().dp_W.norm() < 0.05);
 }
 
 TEST_CASE("filter: biases learned at rest are less certain once the vehicle moves and shakes") {

@@ -232,6 +232,7 @@ ALTERATIONS = [
     Alteration("camera_third", "every third image", on(CAMERAS, every(3)), ("cam0",)),
     Alteration("camera_repeated", "each image comes twice, the second time half an interval later", on(CAMERAS, repeated_images), ("cam0",)),
     Alteration("camera_stamps", "stamps of the images scatter by 3 ms", scattered_stamps, ("cam0",)),
+    Alteration("camera_late", "stamps of the images 50 ms late", on(CAMERAS, later(0.05)), ("cam0",)),
     Alteration("camera_ends", "no image in the second half", on(CAMERAS, without_part(0.5, 1.0)), ("cam0",)),
     Alteration("camera_gap", "no image in the third of five parts", on(CAMERAS, without_part(0.4, 0.6)), ("cam0",)),
     Alteration("right_ends", "no right image in the second half", on(["cam1"], without_part(0.5, 1.0)), ("cam1",)),

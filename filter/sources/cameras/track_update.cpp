@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "filter/ingest/limits.h"
 
@@ -29,6 +30,20 @@ void for_each_view(const Track& track, const State& x, const Function& see) {
   }
 }
 
+/// The gate of a state that is right refuses hardly any feature. Where it refuses most of them, those that pass agree
+/// by chance with what is wrong: they are refused too. True then.
+bool refuse_few(Records& records) {
+  FrameStatistics& seen = records.statistics;
+  const bool contradicted =
+      seen.features_rejected > seen.features_used && seen.features_used + seen.features_rejected >= kFewFeatures;
+  if (!contradicted) return false;
+  seen.features_rejected += std::exchange(seen.features_used, 0);
+  if (records.outcomes != nullptr) {
+    for (TrackOutcome& outcome : *records.outcomes) outcome.used = false;
+  }
+  return true;
+}
+
 }  // namespace
 
 TrackUpdate::TrackUpdate(const FilterConfig& config, double focal_px)
@@ -54,9 +69,10 @@ void TrackUpdate::update(bool oldest_goes, CameraUpdate calibration, TrackTable&
     tracks[i].observations.clear();  // each observation is used once
   }
   lens_pattern_.forget();
+  const bool contradicted = refuse_few(records);
   log(ekf, records);
   information_.compress(kNegligible);
-  if (information_.residual().size() > 0) {
+  if (!contradicted && information_.residual().size() > 0) {
     ekf.apply(information_.H(), err::camera, information_.residual(), calibration);
   }
   // Features that ended, used or not, are forgotten.
