@@ -71,6 +71,7 @@ void Filter::watch_biases() {
 }
 
 std::optional<Estimate> Filter::report(bool image, const FrameAgreement& seen) {
+  if (health_.contradicted() && last_good_) alignment_.doubt(last_good_->state, ekf_.state().imu.t_ns);
   UnseenScales scales;
   scales.length = start_.scale_is_given() ? config_.prior.wheel_scale : sources_.cameras().scale_sigma();
   if (calibration_.cameras.empty()) scales.turn = config_.prior.gyro_unseen;

@@ -8,6 +8,9 @@ namespace {
 
 constexpr double kUnseenSpeed = 1.0;  // [m/s] chosen: that the vehicle may have gained since it was lost
 
+/// How far it may have gone since it was last known.
+double unseen_path(const NavState& last, double seconds) { return seconds * (last.v_W.norm() + kUnseenSpeed); }
+
 }  // namespace
 
 MapAlignment MapAlignment::join(const NavState& last_W, const NavState& state_A, double yaw_sigma,
@@ -21,6 +24,10 @@ MapAlignment MapAlignment::join(const NavState& last_W, const NavState& state_A,
   alignment.yaw_sigma = yaw_sigma;
   alignment.position_sigma = position_sigma;
   return alignment;
+}
+
+void MapAlignment::doubt(const NavState& last_W, TimeNs t_ns) {
+  position_sigma = std::max(position_sigma, unseen_path(last_W, seconds_between(last_W.t_ns, t_ns)));
 }
 
 NavState MapAlignment::to_world(const NavState& state_A) const {
@@ -65,7 +72,7 @@ MapAlignment align_after_restart(const Estimate& last_good, const ImuState& x, c
   } else {
     yaw_variance = M_PI * M_PI / 3.0;
   }
-  const double path = since * (last.v_W.norm() + kUnseenSpeed);
+  const double path = unseen_path(last, since);
   const double position_sigma = std::sqrt(variance.segment<3>(estimate_error::position).maxCoeff() + path * path);
   return MapAlignment::join(last, nav_state(x), std::sqrt(yaw_variance), position_sigma);
 }

@@ -22,6 +22,10 @@ struct MapAlignment {
   /// The vehicle as it was last known, in W, and how uncertain that became since: the vehicle `state_A` is now there.
   static MapAlignment join(const NavState& last_W, const NavState& state_A, double yaw_sigma, double position_sigma);
 
+  /// The state goes on, but what it did since it was last known was contradicted: where it is, is known no better than
+  /// after a start.
+  void doubt(const NavState& last_W, TimeNs t_ns);
+
   [[nodiscard]] NavState to_world(const NavState& state_A) const;
   /// The covariance in W: turned, and with what is not known of the alignment itself. `state_A`: that of the estimate.
   [[nodiscard]] ImuErrorMatrix to_world(const ImuErrorMatrix& covariance_A, const NavState& state_A) const;

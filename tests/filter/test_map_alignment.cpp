@@ -68,3 +68,15 @@ TEST_CASE("map_alignment: a yaw error moves what it says it moves") {
   d.segment<3>(estimate_error::position) = (b.p_WB - a.p_WB) / e;
   CHECK((alignment.to_world(Matrix::Zero(), later_A) - d * d.transpose()).norm() < 1e-4);
 }
+
+TEST_CASE("map_alignment: a state in doubt is as uncertain as the way that it may have gone, and stays so") {
+  NavState last_W = state(0.0, {4.0, -2.0, 0.5}, {0.6, 0.8, 0.0});
+  last_W.t_ns = 5'000'000'000;
+  MapAlignment alignment;
+  alignment.doubt(last_W, 8'000'000'000);
+  CHECK(alignment.position_sigma ==
+        doctest::Approx(3.0 * (1.0 + 1.0)));  // three seconds, at a speed of one, and one more
+  alignment.doubt(last_W, 6'000'000'000);
+  CHECK(alignment.position_sigma == doctest::Approx(6.0));
+  CHECK(alignment.to_world(last_W).p_WB == last_W.p_WB);
+}
