@@ -4,6 +4,9 @@ test_altered.py ROOT EAR_PROGRAM
 """
 
 import json
+import math
+import re
+import statistics
 import subprocess
 import sys
 import tempfile
@@ -14,7 +17,7 @@ ROOT = Path(sys.argv.pop(1)).resolve()
 PROGRAM = Path(sys.argv.pop(1)).resolve()
 DATA = ROOT / "../shared/data"
 sys.path.insert(0, str(ROOT / "tools"))
-from real import altered  # noqa: E402
+from real import altered, miscalibrated  # noqa: E402
 
 
 class Copies(unittest.TestCase):
@@ -45,8 +48,73 @@ class Copies(unittest.TestCase):
         self.assertEqual(self.rows("imu_late")[0][0], 20e6)
         self.assertIn("rate_hz: 200", (self.recording / "mav0/imu0/sensor.yaml").read_text(encoding="utf-8"))
 
+    def test_spikes_are_of_one_to_five_samples(self):
+        imu = self.recording / "mav0/imu0/data.csv"
+        imu.write_text("".join(f"{10**7 * i},0,0,0,0,0,9.8\n" for i in range(6000)), encoding="utf-8")  # 60 s at 100 Hz
+        off = "".join("x" if row[3] != 0.0 else " " for row in self.rows("imu_spikes"))
+        self.assertTrue(all(1 <= len(spike) <= 5 for spike in off.split()))
+        self.assertTrue(10 <= len(off.split()) <= 30)
+
     def test_lacks_the_sensor(self):
         self.assertIsNone(self.rows("wheels_exchanged"))
+
+
+class Miscalibrated(unittest.TestCase):
+    """A camera and wheels, 300 times."""
+
+    SENSORS = {
+        "cam0": ("T_BS:\n  data: [0, 0, 1, 0.1,\n         -1, 0, 0, 0,\n         0, -1, 0, 0,\n         0, 0, 0, 1]\n"
+                 "intrinsics: [400.0, 410.0, 320.0, 240.0]  # fu, fv, cu, cv\n"),
+        "encoder0": ("T_BS: {rows: 4, cols: 4, data: [1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,1]}\nwheel_radius: [0.1, 0.2]\n"
+                     "wheel_separation: 0.5\n"),
+        "laser0": "beams:\n  - {name: rear, origin: [0.1, 0.0, 0.0], direction: [0.0, 0.0, -1.0]}\n",
+    }
+
+    def setUp(self):
+        self.scratch = tempfile.TemporaryDirectory()
+        self.addCleanup(self.scratch.cleanup)
+        self.folder = Path(self.scratch.name)
+        for sensor, text in self.SENSORS.items():
+            (self.folder / "small/mav0" / sensor).mkdir(parents=True)
+            (self.folder / "small/mav0" / sensor / "sensor.yaml").write_text(text, encoding="utf-8")
+            (self.folder / "small/mav0" / sensor / "data.csv").write_text("#t\n1000000000,0\n", encoding="utf-8")
+
+    def drawn(self, sensor, key):
+        """The list with this key in each of the copies."""
+        for seed in range(300):
+            folder = self.folder / f"copy{seed}"
+            if not folder.exists():
+                miscalibrated.miscalibrated(self.folder / "small", seed, folder)
+            text = (folder / "mav0" / sensor / "sensor.yaml").read_text(encoding="utf-8")
+            yield [float(x) for x in re.search(key + r": *\[?([^\]\n]*)", text)[1].split(",")]
+
+    def assert_sigma(self, values, expected):
+        self.assertLess(abs(statistics.mean(values)), 4.0 * expected / math.sqrt(300))
+        self.assertLess(abs(statistics.pstdev(values) / expected - 1.0), 0.17)  # four of its standard deviations
+
+    def test_has_the_errors_of_real_rigs(self):
+        camera = list(self.drawn("cam0", "data"))
+        self.assert_sigma([T[3] - 0.1 for T in camera], 1e-3)
+        self.assert_sigma([math.degrees(math.asin(T[0])) for T in camera], 0.2)
+        self.assertLess(max(abs(sum(T[i] * T[i + 4] for i in range(3))) for T in camera), 1e-9)  # still a rotation
+        lens = list(self.drawn("cam0", "intrinsics"))
+        self.assert_sigma([f[0] / 400.0 - 1.0 for f in lens], 1e-3)
+        self.assertLess(max(abs(f[0] / f[1] - 400.0 / 410.0) for f in lens), 1e-9)
+        self.assert_sigma([f[2] - 320.0 for f in lens], 0.5)
+        radius = list(self.drawn("encoder0", "wheel_radius"))
+        self.assert_sigma([r[0] / 0.1 - r[1] / 0.2 for r in radius], 1e-3 * math.sqrt(2.0))
+        self.assert_sigma([r[0] / 0.1 - 1.0 for r in radius], math.hypot(4e-3, 1e-3))
+        self.assert_sigma([w / 0.5 - 1.0 for w, in self.drawn("encoder0", "wheel_separation")], 5e-3)
+        self.assert_sigma([math.degrees(d[0]) for d in self.drawn("laser0", "direction")], 0.3)
+        self.assert_sigma([o[2] for o in self.drawn("laser0", "origin")], 2e-3)
+        stamps = [int((self.folder / f"copy{i}/mav0/encoder0/data.csv").read_text(encoding="utf-8").split()[-1].split(",")[0])
+                  for i in range(300)]
+        self.assert_sigma([1e-9 * t - 1.0 for t in stamps], 2e-3)
+
+    def test_leaves_the_original(self):
+        list(self.drawn("cam0", "data"))
+        for sensor, text in self.SENSORS.items():
+            self.assertEqual((self.folder / "small/mav0" / sensor / "sensor.yaml").read_text(encoding="utf-8"), text)
 
 
 def figures_of(recording, alterations):
@@ -76,6 +144,9 @@ class Hop(unittest.TestCase):
         "camera_third": 0.02,
         "gyro_scale": 0.01,  # 22 mm where the scale is no state
         "wheels_exchanged": 0.02,
+        "imu_spikes": 0.012,
+        "camera_repeated": 0.015,
+        "camera_late": 0.015,  # of 50 ms, 25 standard deviations
         "imu_very_late": None,  # too wrong for an estimate, and the health knows it
         "cameras_exchanged": None,
     }
