@@ -94,7 +94,7 @@ void ImageHealth::report(TimeNs t_ns) {
   carrying_.report(t_ns);
 }
 
-bool ImageHealth::misfit() const { return rejected_ > used_ && used_ + rejected_ >= kFewFeatures; }
+bool ImageHealth::misfit() const { return refuses_most(used_, rejected_); }
 
 bool ImageHealth::come(TimeNs t_ns) const {
   return cameras_ > 0 && arrival_ns_ && seconds_between(*arrival_ns_, t_ns) < longest_silence(interval_);

@@ -43,8 +43,8 @@ class ImageHealth {
   /// `cameras`: 0 to 2.
   explicit ImageHealth(std::size_t cameras) : cameras_(cameras) {}
 
-  /// Whether an image may be used, by how it agrees with what the state and the other sensors expect of it: not
-  /// left and right exchanged, not one with a stamp that jumped; a late one is right.
+  /// Whether an image may be used, by how it agrees with what the state and the other sensors expect of it: not left
+  /// and right exchanged, not one with a stamp that jumped; a late one is right.
   [[nodiscard]] bool check(const FrameAgreement& seen, TimeNs t_ns);
 
   /// An image at `t_ns`, after it was used or not. `running`: there is a state.

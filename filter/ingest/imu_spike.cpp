@@ -23,25 +23,26 @@ double left_by_line(double q, double intervals, double samples) {
 
 bool SpikeWatch::add(ImuBuffer& samples, double dt, int lost, bool clips) {
   const Eigen::Vector3d value = samples.entry(0).sample.*value_;
-  const Eigen::Vector3d before = samples.entry(length_ + 1).sample.*value_;
-  const Eigen::Vector3d change = value - (in_doubt() ? measured_[length_ - 1] : before);
+  const Eigen::Vector3d before = samples.entry(doubt_.length + 1).sample.*value_;
+  const Eigen::Vector3d change = value - (in_doubt() ? doubt_.measured[doubt_.length - 1] : before);
   const double spread = kClear * std::sqrt(step_variance_);
   const double limit = std::max({least_, least_rate_ * dt, spread});
-  const bool jumps = change.norm() > limit;
+  const double step = change.norm();
+  const bool jumps = step > limit;
 
   if (in_doubt()) {
-    lost_ += static_cast<std::size_t>(lost);
-    doubtful_ += dt;
-    const double off = (measured_[length_ - 1] - before).norm();
-    if (jumps && lost_ <= kLongest && (value - before).norm() <= kAlike * off) {
-      replace(samples);
+    doubt_.lost += static_cast<std::size_t>(lost);
+    const double seconds = doubt_.seconds + dt;
+    const double off = (doubt_.measured[doubt_.length - 1] - before).norm();
+    if (jumps && doubt_.lost <= kLongest && (value - before).norm() <= kAlike * off) {
+      replace(samples, seconds);
       last_change_.reset();
       return true;
     }
-    const bool strike = strikes_ && (value - measured_[0]).norm() > kAlike * off;
-    if (length_ == kLongest || lost_ > kLongest || strike) {
+    const bool strike = strikes_ && (value - doubt_.measured[0]).norm() > kAlike * off;
+    if (doubt_.length == kLongest || doubt_.lost > kLongest || strike) {
       give_up(samples);
-      count(limit, doubtful_);
+      count(limit, seconds);
     }
   }
   if (!in_doubt() && lost > 0) {
@@ -50,7 +51,7 @@ bool SpikeWatch::add(ImuBuffer& samples, double dt, int lost, bool clips) {
   }
 
   if (!jumps) {
-    count(change.norm(), dt);
+    count(step, dt);
     if (last_change_) shared_ += (1.0 - std::exp(-dt / kNoiseMemory)) * (change.dot(*last_change_) - shared_);
   }
   last_change_ = jumps ? std::nullopt : std::optional(change);
@@ -65,19 +66,15 @@ bool SpikeWatch::add(ImuBuffer& samples, double dt, int lost, bool clips) {
 
 /// The newest sample may be part of a spike: the value before it is held.
 void SpikeWatch::hold(ImuBuffer& samples, double dt, bool clips) {
-  if (!in_doubt()) {
-    clipped_ = false;
-    lost_ = 0;
-    doubtful_ = dt;
-  }
-  const Eigen::Vector3d before = samples.entry(length_ + 1).sample.*value_;
-  clipped_ = clipped_ || clips;
-  measured_[length_++] = samples.entry(0).sample.*value_;
-  for (std::size_t i = strikes_ && length_ == 1 ? 1 : 0; i < length_; ++i) {
-    ImuBuffer::Entry& held = samples.entry(length_ - 1 - i);
+  const Eigen::Vector3d before = samples.entry(doubt_.length + 1).sample.*value_;
+  doubt_.seconds += dt;
+  doubt_.clipped = doubt_.clipped || clips;
+  doubt_.measured[doubt_.length++] = samples.entry(0).sample.*value_;
+  for (std::size_t i = strikes_ && doubt_.length == 1 ? 1 : 0; i < doubt_.length; ++i) {
+    ImuBuffer::Entry& held = samples.entry(doubt_.length - 1 - i);
     const double coherent = std::sqrt(2.0 * static_cast<double>(i) + 1.0);
     held.sample.*value_ = before;
-    held.noise.*factor_ = std::max(held.noise.*factor_, coherent * (measured_[i] - before).norm() / sigma_);
+    held.noise.*factor_ = std::max(held.noise.*factor_, coherent * (doubt_.measured[i] - before).norm() / sigma_);
   }
 }
 
@@ -86,25 +83,26 @@ void SpikeWatch::hold(ImuBuffer& samples, double dt, bool clips) {
 /// step. To this comes what the samples of the spike do not agree about. One or two may be true in a strike that fits
 /// in between, and more if they are alike because they are clipped: then the sum of n has the standard deviation of n
 /// of them.
-void SpikeWatch::replace(ImuBuffer& samples) {
-  const auto n = static_cast<double>(length_);
-  const Eigen::Vector3d before = samples.entry(length_ + 1).sample.*value_;
+void SpikeWatch::replace(ImuBuffer& samples, double seconds) {
+  const auto n = static_cast<double>(doubt_.length);
+  const Eigen::Vector3d before = samples.entry(doubt_.length + 1).sample.*value_;
   const Eigen::Vector3d slope = (samples.entry(0).sample.*value_ - before) / (n + 1.0);
   Eigen::Vector3d mean = Eigen::Vector3d::Zero(), square = Eigen::Vector3d::Zero();
-  for (std::size_t i = 0; i < length_; ++i) {
-    Eigen::Vector3d& crossed = samples.entry(length_ - i).sample.*value_;
+  for (std::size_t i = 0; i < doubt_.length; ++i) {
+    Eigen::Vector3d& crossed = samples.entry(doubt_.length - i).sample.*value_;
     crossed = before + static_cast<double>(i + 1) * slope;
-    mean += (measured_[i] - crossed) / n;
-    square += (measured_[i] - crossed).cwiseAbs2() / n;
+    mean += (doubt_.measured[i] - crossed) / n;
+    square += (doubt_.measured[i] - crossed).cwiseAbs2() / n;
   }
-  const bool unresolved = length_ <= 2 && doubtful_ > kShortestStrike;
-  const bool may_be_true = strikes_ && (unresolved || clipped_);
+  const bool unresolved = doubt_.length <= 2 && seconds > kShortestStrike;
+  const bool may_be_true = strikes_ && (unresolved || doubt_.clipped);
   const double disagreement = may_be_true ? n * square.sum() : square.sum() - mean.squaredNorm();
-  const double variance = (left_by_line(step_variance_, n + static_cast<double>(lost_) + 1.0, n) + disagreement) / 3.0;
-  for (std::size_t i = 0; i < length_; ++i) {
-    samples.entry(length_ - i).noise.*factor_ = std::max(1.0, std::sqrt(variance) / sigma_);
+  const double variance =
+      (left_by_line(step_variance_, n + static_cast<double>(doubt_.lost) + 1.0, n) + disagreement) / 3.0;
+  for (std::size_t i = 0; i < doubt_.length; ++i) {
+    samples.entry(doubt_.length - i).noise.*factor_ = std::max(1.0, std::sqrt(variance) / sigma_);
   }
-  length_ = 0;
+  doubt_ = {};
 }
 
 /// As in a spike: what the line leaves of the integral over n samples lies between two that were measured. The step
@@ -128,8 +126,8 @@ void SpikeWatch::count(double step, double seconds) {
 }
 
 void SpikeWatch::give_up(ImuBuffer& samples) {
-  for (std::size_t i = 0; i < length_; ++i) samples.entry(length_ - i).sample.*value_ = measured_[i];
-  length_ = 0;
+  for (std::size_t i = 0; i < doubt_.length; ++i) samples.entry(doubt_.length - i).sample.*value_ = doubt_.measured[i];
+  doubt_ = {};
 }
 
 void ImuSpikes::give_up(ImuBuffer& samples) {

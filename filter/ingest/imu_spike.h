@@ -46,7 +46,7 @@ class SpikeWatch {
   /// end? A line crosses what was lost elsewhere, too.
   bool add(ImuBuffer& samples, double dt, int lost, bool clips);
   /// Has one begun whose end was not seen yet?
-  [[nodiscard]] bool in_doubt() const { return length_ > 0; }
+  [[nodiscard]] bool in_doubt() const { return doubt_.length > 0; }
   /// Factor on the noise for each interval for which a sample's value is held: the variance of the integral of the walk
   /// over n intervals is q n^3 / 3.
   [[nodiscard]] double held() const;
@@ -60,8 +60,18 @@ class SpikeWatch {
  private:
   static constexpr std::size_t kLongest = 5;
 
+  /// What may be a spike.
+  struct Doubt {
+    std::array<Eigen::Vector3d, kLongest> measured;
+    std::size_t length = 0;
+    std::size_t lost = 0;  ///< samples that did not come meanwhile
+    double seconds = 0.0;  ///< from the sample before it to its newest
+    bool clipped = false;  ///< one of them
+  };
+
   void hold(ImuBuffer& samples, double dt, bool clips);
-  void replace(ImuBuffer& samples);
+  /// `seconds`: from the sample before it to the one after.
+  void replace(ImuBuffer& samples, double seconds);
   void cross(ImuBuffer& samples, double dt, int lost);
   /// What the body did in so many seconds; nothing that a spike does.
   void count(double step, double seconds);
@@ -73,12 +83,7 @@ class SpikeWatch {
   double step_variance_;                        ///< of the recent steps between samples, all axes together
   std::optional<Eigen::Vector3d> last_change_;  ///< the step before the newest, if it was the body's
   double shared_ = 0.0;                         ///< mean product of two steps in a row, all axes together
-  // What may be a spike:
-  std::array<Eigen::Vector3d, kLongest> measured_;
-  std::size_t length_ = 0;
-  std::size_t lost_ = 0;   ///< samples that did not come meanwhile
-  double doubtful_ = 0.0;  ///< [s] for so long
-  bool clipped_ = false;   ///< one of them
+  Doubt doubt_;
 };
 
 class ImuSpikes {

@@ -49,6 +49,10 @@ inline constexpr int kToKnow = 20;     ///< chosen: a mean of so many is known, 
 inline constexpr int kConfirmed = 3;
 /// Chosen: fewer features show too little of where the vehicle is, or of how it moved.
 inline constexpr int kFewFeatures = 10;
+/// Does the gate refuse most of so many features? That of a state that is right refuses hardly any.
+[[nodiscard]] inline bool refuses_most(double used, double rejected) {
+  return rejected > used && used + rejected >= kFewFeatures;
+}
 
 // ---- Memory
 

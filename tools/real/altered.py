@@ -3,6 +3,7 @@
 Nobody tuned to these. An estimate may be poor then, and may be refused; its health must not say "tracking" where it is far off.
 """
 
+import bisect
 import math
 import random
 import re
@@ -52,14 +53,22 @@ class Copy:
             if (self.mav0 / sensor / "data.csv").exists():
                 self.write(sensor, function(self.rows(sensor)))
 
+    def rewrite(self, sensor, function):
+        """sensor.yaml, if it is there, becomes `function` of what it was."""
+        path = self.mav0 / sensor / "sensor.yaml"
+        if path.exists():
+            path.write_text(function(path.read_text(encoding="utf-8")), encoding="utf-8")
+
     def change_value(self, sensor, key, function):
         """A number in sensor.yaml, if it is there, becomes `function` of what it was. Returns that."""
-        path = self.mav0 / sensor / "sensor.yaml"
-        text = path.read_text(encoding="utf-8")
-        pattern = key + r": *([0-9.]+)"
-        path.write_text(re.sub(pattern, lambda m: f"{key}: {function(float(m[1])):g}", text), encoding="utf-8")
-        found = re.search(pattern, text)
-        return float(found[1]) if found else None
+        before = []
+
+        def change(found):
+            before.append(float(found[1]))
+            return f"{key}: {function(before[0]):g}"
+
+        self.rewrite(sensor, lambda text: re.sub(key + r": *([0-9.]+)", change, text, count=1))
+        return before[0] if before else None
 
     def set_rate(self, sensor, divided_by):
         self.change_value(sensor, "rate_hz", lambda rate: rate / divided_by)
@@ -128,9 +137,10 @@ def noisy_imu(copy):
 
 def spikes(rows):
     """20 a minute, none within 0.1 s of another, of one to five samples that are off together."""
-    draws, at = random.Random(7), int(rows[0][0]) + 3 * 10**9
-    while at < int(rows[-1][0]):
-        first = next(i for i, row in enumerate(rows) if int(row[0]) >= at)
+    draws, times = random.Random(7), [int(row[0]) for row in rows]
+    at = times[0] + 3 * 10**9
+    while at < times[-1]:
+        first = bisect.bisect_left(times, at)
         off = [0.0, *(draws.gauss(0.0, 3.0) for _ in GYRO), *(draws.gauss(0.0, 40.0) for _ in ACCEL)]
         for row in rows[first : first + draws.randint(1, 5)]:
             row[1:] = [repr(float(row[column]) + off[column]) for column in GYRO + ACCEL]

@@ -75,10 +75,16 @@ def judge_with_alarms(program, output, recording):
     return {**figures, **alarms(json.loads((output / "summary.json").read_text(encoding="utf-8")), figures)}
 
 
-def cell(figures, path, factor, decimals):
+def figure(figures, path):
+    """The one at the end of the path, or nothing."""
     for key in path:
         figures = figures.get(key) if figures else None
-    return "-" if figures is None else f"{factor * figures:.{decimals}f}"
+    return figures
+
+
+def cell(figures, path, factor, decimals):
+    value = figure(figures, path)
+    return "-" if value is None else f"{factor * value:.{decimals}f}"
 
 
 def table(judged):

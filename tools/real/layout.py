@@ -171,6 +171,15 @@ def matrix(w, x, y, z):
             [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]]
 
 
+def turned(R, v):
+    """R Exp(v)."""
+    angle = math.sqrt(sum(a * a for a in v))
+    if angle < 1e-12:
+        return R
+    s = math.sin(angle / 2) / angle
+    return multiply(R, matrix(math.cos(angle / 2), *(s * a for a in v)))
+
+
 def quaternion(R):
     """w, x, y, z with w >= 0, by the largest of the four."""
     squares = [1 + R[0][0] + R[1][1] + R[2][2], 1 + R[0][0] - R[1][1] - R[2][2],

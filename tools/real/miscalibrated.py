@@ -10,7 +10,8 @@ import re
 import statistics
 
 from real.altered import CAMERAS, Copy, later
-from real.layout import BadInput, multiply, rotate
+from real.judge import figure
+from real.layout import BadInput, multiply, rotate, turned
 
 DEGREE = math.pi / 180
 LIST = r": *\[([^\]]*)\]"
@@ -18,12 +19,7 @@ LIST = r": *\[([^\]]*)\]"
 
 def turn(draws, sigma):
     """A rotation by a vector of three independent angles [rad]."""
-    v = [draws.gauss(0.0, sigma) for _ in range(3)]
-    angle = math.sqrt(sum(x * x for x in v))
-    K = [[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]]
-    KK = multiply(K, K)
-    a, b = math.sin(angle) / angle, (1 - math.cos(angle)) / angle**2
-    return [[(i == j) + a * K[i][j] + b * KK[i][j] for j in range(3)] for i in range(3)]
+    return turned([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], shift(draws, sigma))
 
 
 def shift(draws, sigma):
@@ -50,27 +46,21 @@ def changed(text, key, function):
     return text[: found.start(1)] + ", ".join(f"{x:.12g}" for x in values) + text[found.end(1) :]
 
 
-def rewrite(copy, sensor, function):
-    path = copy.mav0 / sensor / "sensor.yaml"
-    if path.exists():
-        path.write_text(function(path.read_text(encoding="utf-8")), encoding="utf-8")
-
-
 def change_cameras(copy, draws):
     R, p = turn(draws, 0.2 * DEGREE), shift(draws, 1e-3)
     apart, aside = turn(draws, 0.02 * DEGREE), shift(draws, 5e-5)
     for camera in CAMERAS:
         longer, u, v = 1 + draws.gauss(0.0, 1e-3), draws.gauss(0.0, 0.5), draws.gauss(0.0, 0.5)
-        rewrite(copy, camera, lambda text: changed(
+        copy.rewrite(camera, lambda text: changed(
             moved(text, R, p), "intrinsics", lambda f: [longer * f[0], longer * f[1], f[2] + u, f[3] + v]))
-    rewrite(copy, CAMERAS[1], lambda text: moved(text, apart, aside))
+    copy.rewrite(CAMERAS[1], lambda text: moved(text, apart, aside))
 
 
 def change_wheels(copy, draws):
     R, p = turn(draws, 0.3 * DEGREE), shift(draws, 3e-3)
     larger, wider = 1 + draws.gauss(0.0, 4e-3), 1 + draws.gauss(0.0, 5e-3)
     apart = [draws.gauss(0.0, 1e-3) for _ in range(2)]
-    rewrite(copy, "encoder0", lambda text: changed(
+    copy.rewrite("encoder0", lambda text: changed(
         moved(text, R, p), "wheel_radius", lambda radius: [r * (larger + a) for r, a in zip(radius, apart)]))
     copy.change_value("encoder0", "wheel_separation", lambda width: wider * width)
 
@@ -85,7 +75,7 @@ def change_beams(copy, draws):
                 lines[i] = changed(line, "direction", lambda d, R=R: rotate(R, d))
         return "\n".join(lines)
 
-    rewrite(copy, "laser0", change)
+    copy.rewrite("laser0", change)
 
 
 def miscalibrated(recording, seed, folder):
@@ -100,14 +90,8 @@ def miscalibrated(recording, seed, folder):
     return folder
 
 
-def value(figures, *path):
-    for key in path:
-        figures = figures.get(key) if figures else None
-    return figures
-
-
 def mean_of(runs, *path):
-    values = [value(run, *path) for run in runs]
+    values = [figure(run, path) for run in runs]
     return f"{statistics.mean(values):.1f}" if values and None not in values else "-"
 
 

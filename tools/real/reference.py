@@ -8,7 +8,7 @@ truth breaks this, an estimate is told an error that is the truth's.
 import bisect
 import math
 
-from real.layout import BadInput, matrix, multiply, read_lines, read_numbers, rotate, transpose
+from real.layout import BadInput, matrix, multiply, read_lines, read_numbers, rotate, transpose, turned
 
 WINDOW = 0.3  # [s] of the second difference: noise of the accelerometer does not count yet, that of positions does
 STEP = 0.05  # [s] from one second difference to the next
@@ -27,15 +27,6 @@ def vector_of(R):
     angle = math.acos(c)
     scale = 0.5 if angle < 1e-6 else angle / (2 * math.sin(angle))
     return [scale * (R[2][1] - R[1][2]), scale * (R[0][2] - R[2][0]), scale * (R[1][0] - R[0][1])]
-
-
-def turned(R, v):
-    """R Exp(v)."""
-    angle = math.sqrt(sum(a * a for a in v))
-    if angle < 1e-12:
-        return R
-    s = math.sin(angle / 2) / angle
-    return multiply(R, matrix(math.cos(angle / 2), *(s * a for a in v)))
 
 
 class Series:

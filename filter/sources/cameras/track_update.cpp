@@ -30,13 +30,11 @@ void for_each_view(const Track& track, const State& x, const Function& see) {
   }
 }
 
-/// The gate of a state that is right refuses hardly any feature. Where it refuses most of them, those that pass agree
-/// by chance with what is wrong: they are refused too. True then.
+/// Where the gate refuses most features, those that pass agree by chance with what is wrong: they are refused too. True
+/// then.
 bool refuse_few(Records& records) {
   FrameStatistics& seen = records.statistics;
-  const bool contradicted =
-      seen.features_rejected > seen.features_used && seen.features_used + seen.features_rejected >= kFewFeatures;
-  if (!contradicted) return false;
+  if (!refuses_most(seen.features_used, seen.features_rejected)) return false;
   seen.features_rejected += std::exchange(seen.features_used, 0);
   if (records.outcomes != nullptr) {
     for (TrackOutcome& outcome : *records.outcomes) outcome.used = false;
