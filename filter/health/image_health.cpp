@@ -10,8 +10,13 @@ namespace ear {
 namespace {
 
 constexpr double kSomeOff = 0.1;        // chosen: of the features off their place; a camera may be faulty
-constexpr double kSparse = 0.4;         // chosen: of the usual number of features, or of the left camera's
+constexpr double kSparse = 0.4;         // chosen: of the usual number of features, or share of them in both cameras
 constexpr double kTracksMemory = 20.0;  // [s] chosen
+
+/// Are clearly more than kSomeOff of so many features off their place? `share`: those that are.
+bool some_off(double share, int features) {
+  return share > kSomeOff + kClear * std::sqrt(kSomeOff * (1.0 - kSomeOff) / features);
+}
 
 /// Left and right are exchanged: the stereo features seem to be behind the cameras.
 bool crossed(const FrameAgreement& seen) { return seen.behind > kMajority; }
@@ -70,14 +75,15 @@ void ImageHealth::judge(TimeNs t_ns, bool running, const FrameAgreement& seen, c
   const double share = std::max(interval_ / kTracksMemory, 1.0 / (1.0 + counted_));
   usual_tracks_ += share * (tracks - usual_tracks_);
   ++counted_;
-  const double kept = std::exp(-interval_ / kLasting);
+  const double kept = statistics.standing ? 0.0 : std::exp(-interval_ / kLasting);  // at rest the images show rest
   used_ = kept * used_ + statistics.features_used;
   rejected_ = kept * rejected_ + statistics.features_rejected;
   carrying_.add(blind || misfit() || (known && seen.left > kMajority), t_ns);
-  left_.add(poor || misfit() || (known && seen.left > kSomeOff), t_ns);
+  left_.add(poor || misfit() || (known && some_off(seen.left, seen.matches)), t_ns);
   if (cameras_ == 2 && !seen.right_skipped) {
-    const bool one_eyed = statistics.stereo < kSparse * tracks;
-    right_.add(poor || one_eyed || (known && seen.right > kSomeOff), t_ns);
+    const bool one_eyed = statistics.stereo < std::max<double>(kFewFeatures, kSparse * usual_stereo_ * tracks);
+    usual_stereo_ += share * (static_cast<double>(statistics.stereo) / std::max(1, tracks) - usual_stereo_);
+    right_.add(poor || one_eyed || (known && some_off(seen.right, seen.matches)), t_ns);
   }
   if (crossed(seen)) report(t_ns);
 }

@@ -82,6 +82,7 @@ class ImageHealth {
   std::optional<TimeNs> arrival_ns_;  ///< the newest inertial stamp when the last one came
   double interval_ = 0.0;             ///< [s] usual
   double usual_tracks_ = 0.0;
+  double usual_stereo_ = 0.0;           ///< share of the features that both cameras see
   int counted_ = 0;                     ///< of those
   double used_ = 0.0, rejected_ = 0.0;  ///< features, recent ones
 };

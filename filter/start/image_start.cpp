@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <utility>
 
@@ -37,8 +38,9 @@ struct Point {
 bool by_right(const Sight& sight) { return sight.camera == 1; }
 bool by_both(const Point& point) { return std::any_of(point.sights.begin(), point.sights.end(), by_right); }
 
-/// The points that enough of the frames see. Few that the right camera sees, too, may be false matches, which would say
-/// how long the path is: then the left one counts alone.
+/// The points that so many of the frames see that these confirm each other; where too few of them are seen by both
+/// cameras, as at a low rate, also those that both see in one frame less. Few that the right camera sees, too, may be
+/// false matches, which would say how long the path is: then the left one counts alone.
 std::vector<Point> points_of(const std::vector<const TimedFrame*>& frames) {
   std::map<std::uint64_t, Point> by_id;
   for (std::size_t k = 0; k < frames.size(); ++k) {
@@ -49,11 +51,21 @@ std::vector<Point> points_of(const std::vector<const TimedFrame*>& frames) {
     }
   }
   std::vector<Point> points;
+  std::vector<Point> shorter;
   for (auto& [id, point] : by_id) {
     const std::size_t frames_between = point.sights.back().moment - point.sights.front().moment;
-    if (frames_between >= kConfirmed) points.push_back(std::move(point));
+    if (frames_between >= kConfirmed) {
+      points.push_back(std::move(point));
+    } else if (frames_between + 1 == kConfirmed && by_both(point)) {
+      shorter.push_back(std::move(point));
+    }
   }
-  if (std::count_if(points.begin(), points.end(), by_both) >= kToKnow) return points;
+  const auto count = static_cast<std::size_t>(std::count_if(points.begin(), points.end(), by_both));
+  if (count >= kToKnow) return points;
+  if (count + shorter.size() >= kToKnow) {
+    std::move(shorter.begin(), shorter.end(), std::back_inserter(points));
+    return points;
+  }
   for (Point& point : points) {
     point.sights.erase(std::remove_if(point.sights.begin(), point.sights.end(), by_right), point.sights.end());
   }

@@ -74,3 +74,22 @@ TEST_CASE("moving start: not with swapped cameras, nor with a frozen image") {
     frame.features = first.features;
   }));
 }
+
+TEST_CASE("moving start: at five frames a second features last for three frames, which is enough by two cameras") {
+  const simulator::Simulation simulation = fly(5.0, 833);
+  std::uint64_t frames = 0;
+  bool one_camera = false;
+  const auto short_lived = [&](FeatureFrame& frame) {
+    for (FeatureObservation& feature : frame.features) {
+      feature.id = 1000 * feature.id + (frames + feature.id) / 3;  // one third of them end with each frame
+      if (one_camera) feature.has_right = false;
+    }
+    ++frames;
+  };
+  const std::optional<ImuState> state = start(simulation, 12.0, short_lived);
+  REQUIRE(state);
+  const simulator::Truth truth = simulation.truth(state->t_ns);
+  CHECK((state->R_WB.transpose() * state->v_W - truth.R_WB.transpose() * truth.v_W).norm() < 0.3);
+  one_camera = true;
+  CHECK_FALSE(start(simulation, 12.0, short_lived));
+}

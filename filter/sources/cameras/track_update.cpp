@@ -60,11 +60,13 @@ void TrackUpdate::update(bool oldest_goes, CameraUpdate calibration, TrackTable&
   residuals_ = {};
   camera_poses(x, cameras_);
   for (const std::size_t i : selected_) {
-    const bool used = add(tracks[i], ekf);
+    const Finding finding = add(tracks[i], ekf);
+    const bool used = finding == Finding::fits;
     if (used) add_to_pattern(tracks[i], x.camera);
+    tracks[i].observations.clear();  // each observation is used once
+    if (finding == Finding::nothing) continue;
     ++(used ? records.statistics.features_used : records.statistics.features_rejected);
     if (records.outcomes != nullptr) records.outcomes->push_back({tracks[i].id, used});
-    tracks[i].observations.clear();  // each observation is used once
   }
   lens_pattern_.forget();
   const bool contradicted = refuse_few(records);
@@ -96,23 +98,53 @@ void TrackUpdate::select(const State& x, bool oldest_goes, const TrackTable& tra
   if (selected_.size() > limit) selected_.resize(limit);
 }
 
-bool TrackUpdate::add(const Track& track, const Ekf& ekf) {
+TrackUpdate::Finding TrackUpdate::add(const Track& track, const Ekf& ekf) {
   const State& x = ekf.state();
   sightings_.clear();
   for_each_view(track, x, [&](int clone, std::size_t camera, const Eigen::Vector2d& uv) {
     const CameraPose& pose = cameras_[2 * static_cast<std::size_t>(clone) + camera];
     sightings_.push_back({pose.R_CW, pose.p_WC, x.camera.lens_error[camera].corrected(uv)});
   });
+  if (!knows_baseline(track, ekf)) return Finding::nothing;
   const std::optional<InverseDepthPoint> point = triangulate(sightings_);
-  if (!point) return false;
+  if (!point) return Finding::contradicts;
   observations_.clear();
   for_each_view(track, x, [&](int clone, std::size_t camera, const Eigen::Vector2d& uv) {
     observations_.push_back(linearize_observation(x, clone, static_cast<int>(camera), *point, uv));
     residuals_[camera].squares_px2 += focal_px_ * focal_px_ * observations_.back().residual.squaredNorm();
     residuals_[camera].count += 2;
   });
-  return information_.add(observations_, config_.feature_sigma_px / focal_px_,
-                          config_.huber_px / config_.feature_sigma_px, ekf.covariance().matrix(), ekf.gate());
+  const bool fits =
+      information_.add(observations_, config_.feature_sigma_px / focal_px_, config_.huber_px / config_.feature_sigma_px,
+                       ekf.covariance().matrix(), ekf.gate());
+  return fits ? Finding::fits : Finding::contradicts;
+}
+
+/// Two cameras always do. One shows the product of how far it moved and how near the feature is, of which the filter
+/// takes the first order: the error of that is less than a sixteenth of the product if the way is kClear times its
+/// standard deviation. docs/decisions/0053.
+bool TrackUpdate::knows_baseline(const Track& track, const Ekf& ekf) const {
+  const auto& seen = track.observations;
+  if (std::any_of(seen.begin(), seen.end(), [](const TrackObservation& o) { return o.has_right; })) return true;
+  const State& x = ekf.state();
+  const int from = clone_index(x, seen.front().frame);
+  const Eigen::Vector3d& p_from = left_camera(from);
+  int to = from;
+  for (const TrackObservation& o : seen) {
+    const int clone = clone_index(x, o.frame);
+    if ((left_camera(clone) - p_from).squaredNorm() > (left_camera(to) - p_from).squaredNorm()) to = clone;
+  }
+  if (to == from) return false;
+  const Eigen::Vector3d& p_to = left_camera(to);
+  const Eigen::RowVector3d along = (p_to - p_from).normalized().transpose();
+  Eigen::Matrix<double, 1, 2 * err::clone_size> J;  // of the way, by the errors of both clones
+  J << along * skew(p_from), -along, -along * skew(p_to), along;
+  const auto P = [&](int a, int b) {
+    return ekf.covariance().matrix().block<err::clone_size, err::clone_size>(err::clone(a), err::clone(b));
+  };
+  Eigen::Matrix<double, 2 * err::clone_size, 2 * err::clone_size> P_both;
+  P_both << P(from, from), P(from, to), P(to, from), P(to, to);
+  return (p_to - p_from).squaredNorm() > kClear * kClear * (J * P_both * J.transpose()).value();
 }
 
 /// The newest that both cameras saw: what is wrong with the others is much the same.

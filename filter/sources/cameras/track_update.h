@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <vector>
 
 #include "ear/filter_config.h"
@@ -27,8 +28,16 @@ class TrackUpdate {
   void reset() { lens_pattern_.reset(); }
 
  private:
+  /// What a track shows of the state.
+  enum class Finding : std::uint8_t { fits, contradicts, nothing };
+
   void select(const State& x, bool oldest_goes, const TrackTable& tracks);
-  bool add(const Track& track, const Ekf& ekf);
+  [[nodiscard]] Finding add(const Track& track, const Ekf& ekf);
+  /// Is it known how far the cameras moved, or are apart, that saw it?
+  [[nodiscard]] bool knows_baseline(const Track& track, const Ekf& ekf) const;
+  [[nodiscard]] const Eigen::Vector3d& left_camera(int clone) const {
+    return cameras_[2 * static_cast<std::size_t>(clone)].p_WC;
+  }
   void add_to_pattern(const Track& track, const CameraState& cameras);
   void log(const Ekf& ekf, Records& records) const;
 

@@ -1,0 +1,117 @@
+// What tracks show of the state: features of one camera only where it is known how far it moved.
+#include "filter/sources/cameras/track_update.h"
+
+#include <doctest/doctest.h>
+
+#include <cmath>
+
+#include "tests/support/about.h"
+
+using namespace ear;
+using ear::test::about;
+
+namespace {
+
+constexpr TimeNs kStart = 1'000'000'000;
+constexpr TimeNs kPeriod = 5'000'000;
+constexpr TimeNs kFrame = 50'000'000;
+constexpr double kFocal = 400.0;
+constexpr double kSpeed = 1.0;  // [m/s] sideways, along x of a camera that looks along z
+
+struct Uncertain {
+  double velocity = 0.0;  ///< [m/s] standard deviation
+  double heading = 1e-4;  ///< [rad]
+  double position = 0.01;
+};
+
+/// A vehicle at constant speed far from its origin, and what it saw of points 3 m away from five places.
+struct Passage {
+  FilterConfig config;
+  Ekf ekf;
+  TrackTable tracks{64, 16};
+  TrackUpdate update{config, kFocal};
+  Records records;
+
+  explicit Passage(const Uncertain& sigma, std::size_t cameras = 1) : ekf(config, rig(cameras)) {
+    ImuState x;
+    x.t_ns = kStart;
+    x.v_W = {kSpeed, 0.0, 0.0};
+    x.p_WB = {100.0, 50.0, 2.0};
+    Eigen::VectorXd sigmas = Eigen::VectorXd::Constant(err::clones, 1e-6);
+    sigmas.segment<3>(err::theta) << 1e-4, 1e-4, sigma.heading;
+    sigmas.segment<3>(err::nu).setConstant(sigma.velocity);
+    sigmas.segment<3>(err::rho).setConstant(sigma.position);
+    ekf.start(x, sigmas);
+    ImuBuffer imu(512);
+    for (TimeNs t_ns = kStart; t_ns <= kStart + 6 * kFrame; t_ns += kPeriod) imu.push({t_ns, {}, {0.0, 0.0, 9.80665}});
+    for (int i = 0; i < 6; ++i) {
+      ekf.propagate(imu, kStart + i * kFrame, ImuNoiseFactors{1e-3, 1e-3}, 0.0);
+      ekf.clone(1.0);
+      if (i < 5) see(cameras > 1);
+    }
+  }
+  static Calibration rig(std::size_t cameras) {
+    Calibration calibration;
+    calibration.cameras.resize(cameras);
+    if (cameras > 1) calibration.cameras[1].T_BC.translation() = Eigen::Vector3d(0.1, 0.0, 0.0);
+    return calibration;
+  }
+  void see(bool by_both) {
+    const State& x = ekf.state();
+    const Pose T_WC0 = x.clones.back().T_WB * x.camera.T_BC0;
+    const Pose& T_C0C1 = x.camera.T_C0C1;
+    std::vector<FeatureObservation> features;
+    for (std::uint64_t id = 0; id < 20; ++id) {
+      const Eigen::Vector3d f_W = Eigen::Vector3d{99.0 + 0.1 * static_cast<double>(id), 50.0, 5.0};
+      FeatureObservation seen;
+      seen.id = id;
+      const Eigen::Vector3d f_C = T_WC0.R.transpose() * (f_W - T_WC0.p);
+      seen.left = f_C.hnormalized();
+      seen.has_right = by_both;
+      if (by_both) seen.right = (T_C0C1.R.transpose() * (f_C - T_C0C1.p)).hnormalized();
+      features.push_back(seen);
+    }
+    tracks.add(x.clones.back().frame, features);
+  }
+  void run() { update.update(false, CameraUpdate::considered, tracks, ekf, records); }
+  [[nodiscard]] double velocity_sigma(int axis) const {
+    return std::sqrt(ekf.covariance().matrix()(err::nu + axis, err::nu + axis));
+  }
+};
+
+}  // namespace
+
+TEST_CASE("track update: features of one camera count where the way is known to a quarter of it") {
+  for (const double velocity : {0.1 * kSpeed, 0.24 * kSpeed}) {
+    CAPTURE(velocity);
+    Passage passage({velocity});
+    passage.run();
+    CHECK(passage.records.statistics.features_used == 20);
+    CHECK(passage.velocity_sigma(0) > 0.9 * velocity);  // one camera shows no length
+    CHECK(passage.velocity_sigma(1) < 0.5 * velocity);
+    CHECK(passage.tracks.size() == 0);
+  }
+}
+
+TEST_CASE("track update: where it is not they show nothing, and are not refused either") {
+  Passage passage({0.27 * kSpeed});
+  const State before = passage.ekf.state();
+  passage.run();
+  CHECK(passage.records.statistics.features_used == 0);
+  CHECK(passage.records.statistics.features_rejected == 0);
+  CHECK(passage.ekf.state().imu.v_W == before.imu.v_W);
+  CHECK(passage.velocity_sigma(1) == about(0.27 * kSpeed, 1e-3));
+  CHECK(passage.tracks.size() == 0);
+}
+
+TEST_CASE("track update: where the vehicle is in the world does not matter, nor where it heads") {
+  Passage passage({0.24 * kSpeed, 0.1, 10.0});
+  passage.run();
+  CHECK(passage.records.statistics.features_used == 20);
+}
+
+TEST_CASE("track update: two cameras are as far apart as they are") {
+  Passage passage({3.0 * kSpeed}, 2);
+  passage.run();
+  CHECK(passage.records.statistics.features_used == 20);
+}
