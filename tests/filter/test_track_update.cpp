@@ -81,8 +81,8 @@ struct Passage {
 
 }  // namespace
 
-TEST_CASE("track update: features of one camera count where the way is known to a quarter of it") {
-  for (const double velocity : {0.1 * kSpeed, 0.24 * kSpeed}) {
+TEST_CASE("track update: features of one camera count where the way is known to half of it") {
+  for (const double velocity : {0.1 * kSpeed, 0.48 * kSpeed}) {
     CAPTURE(velocity);
     Passage passage({velocity});
     passage.run();
@@ -94,18 +94,18 @@ TEST_CASE("track update: features of one camera count where the way is known to 
 }
 
 TEST_CASE("track update: where it is not they show nothing, and are not refused either") {
-  Passage passage({0.27 * kSpeed});
+  Passage passage({0.54 * kSpeed});
   const State before = passage.ekf.state();
   passage.run();
   CHECK(passage.records.statistics.features_used == 0);
   CHECK(passage.records.statistics.features_rejected == 0);
   CHECK(passage.ekf.state().imu.v_W == before.imu.v_W);
-  CHECK(passage.velocity_sigma(1) == about(0.27 * kSpeed, 1e-3));
+  CHECK(passage.velocity_sigma(1) == about(0.54 * kSpeed, 1e-3));
   CHECK(passage.tracks.size() == 0);
 }
 
 TEST_CASE("track update: where the vehicle is in the world does not matter, nor where it heads") {
-  Passage passage({0.24 * kSpeed, 0.1, 10.0});
+  Passage passage({0.48 * kSpeed, 0.1, 10.0});
   passage.run();
   CHECK(passage.records.statistics.features_used == 20);
 }

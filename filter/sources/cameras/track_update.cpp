@@ -9,6 +9,7 @@
 namespace ear {
 namespace {
 
+constexpr double kKnownWay = 2.0;     // measured, docs/decisions/0053: standard deviations of it
 constexpr double kNegligible = 1e-4;  // measured, docs/performance.md: 2e-4 of a frame's information, 12 % of the rows
 
 int clone_index(const State& x, std::uint64_t frame) {
@@ -121,8 +122,8 @@ TrackUpdate::Finding TrackUpdate::add(const Track& track, const Ekf& ekf) {
 }
 
 /// Two cameras always do. One shows the product of how far it moved and how near the feature is, of which the filter
-/// takes the first order: the error of that is less than a sixteenth of the product if the way is kClear times its
-/// standard deviation. docs/decisions/0053.
+/// takes the first order: what is left out is less than a quarter of the product if the way is twice its standard
+/// deviation. docs/decisions/0053.
 bool TrackUpdate::knows_baseline(const Track& track, const Ekf& ekf) const {
   const auto& seen = track.observations;
   if (std::any_of(seen.begin(), seen.end(), [](const TrackObservation& o) { return o.has_right; })) return true;
@@ -144,7 +145,7 @@ bool TrackUpdate::knows_baseline(const Track& track, const Ekf& ekf) const {
   };
   Eigen::Matrix<double, 2 * err::clone_size, 2 * err::clone_size> P_both;
   P_both << P(from, from), P(from, to), P(to, from), P(to, to);
-  return (p_to - p_from).squaredNorm() > kClear * kClear * (J * P_both * J.transpose()).value();
+  return (p_to - p_from).squaredNorm() > kKnownWay * kKnownWay * (J * P_both * J.transpose()).value();
 }
 
 /// The newest that both cameras saw: what is wrong with the others is much the same.
