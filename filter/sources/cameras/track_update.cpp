@@ -9,7 +9,7 @@
 namespace ear {
 namespace {
 
-constexpr double kKnownWay = 2.0;     // measured, docs/decisions/0053: standard deviations of it
+constexpr double kAlike = 2.0;        // measured, docs/decisions/0053: what is left out is alike in many features
 constexpr double kNegligible = 1e-4;  // measured, docs/performance.md: 2e-4 of a frame's information, 12 % of the rows
 
 int clone_index(const State& x, std::uint64_t frame) {
@@ -61,13 +61,11 @@ void TrackUpdate::update(bool oldest_goes, CameraUpdate calibration, TrackTable&
   residuals_ = {};
   camera_poses(x, cameras_);
   for (const std::size_t i : selected_) {
-    const Finding finding = add(tracks[i], ekf);
-    const bool used = finding == Finding::fits;
+    const bool used = add(tracks[i], ekf);
     if (used) add_to_pattern(tracks[i], x.camera);
-    tracks[i].observations.clear();  // each observation is used once
-    if (finding == Finding::nothing) continue;
     ++(used ? records.statistics.features_used : records.statistics.features_rejected);
     if (records.outcomes != nullptr) records.outcomes->push_back({tracks[i].id, used});
+    tracks[i].observations.clear();  // each observation is used once
   }
   lens_pattern_.forget();
   const bool contradicted = refuse_few(records);
@@ -99,34 +97,34 @@ void TrackUpdate::select(const State& x, bool oldest_goes, const TrackTable& tra
   if (selected_.size() > limit) selected_.resize(limit);
 }
 
-TrackUpdate::Finding TrackUpdate::add(const Track& track, const Ekf& ekf) {
+bool TrackUpdate::add(const Track& track, const Ekf& ekf) {
   const State& x = ekf.state();
   sightings_.clear();
   for_each_view(track, x, [&](int clone, std::size_t camera, const Eigen::Vector2d& uv) {
     const CameraPose& pose = cameras_[2 * static_cast<std::size_t>(clone) + camera];
     sightings_.push_back({pose.R_CW, pose.p_WC, x.camera.lens_error[camera].corrected(uv)});
   });
-  if (!knows_baseline(track, ekf)) return Finding::nothing;
   const std::optional<InverseDepthPoint> point = triangulate(sightings_);
-  if (!point) return Finding::contradicts;
+  if (!point) return false;
+  const double sigma = config_.feature_sigma_px / focal_px_;
+  const double noise = std::hypot(1.0, kAlike * left_out(track, point->inverse_depth, ekf) / sigma);
   observations_.clear();
   for_each_view(track, x, [&](int clone, std::size_t camera, const Eigen::Vector2d& uv) {
     observations_.push_back(linearize_observation(x, clone, static_cast<int>(camera), *point, uv));
+    observations_.back().noise *= noise;
     residuals_[camera].squares_px2 += focal_px_ * focal_px_ * observations_.back().residual.squaredNorm();
     residuals_[camera].count += 2;
   });
-  const bool fits =
-      information_.add(observations_, config_.feature_sigma_px / focal_px_, config_.huber_px / config_.feature_sigma_px,
-                       ekf.covariance().matrix(), ekf.gate());
-  return fits ? Finding::fits : Finding::contradicts;
+  return information_.add(observations_, sigma, config_.huber_px / config_.feature_sigma_px, ekf.covariance().matrix(),
+                          ekf.gate());
 }
 
-/// Two cameras always do. One shows the product of how far it moved and how near the feature is, of which the filter
-/// takes the first order: what is left out is less than a quarter of the product if the way is twice its standard
-/// deviation. docs/decisions/0053.
-bool TrackUpdate::knows_baseline(const Track& track, const Ekf& ekf) const {
+/// One camera shows the product of how far it moved and how near the feature is, of which the filter takes the first
+/// order. What that leaves out is the square of the way's uncertainty over the way, of the parallax; two cameras are as
+/// far apart as they are. docs/decisions/0053.
+double TrackUpdate::left_out(const Track& track, double inverse_depth, const Ekf& ekf) const {
   const auto& seen = track.observations;
-  if (std::any_of(seen.begin(), seen.end(), [](const TrackObservation& o) { return o.has_right; })) return true;
+  if (std::any_of(seen.begin(), seen.end(), [](const TrackObservation& o) { return o.has_right; })) return 0.0;
   const State& x = ekf.state();
   const int from = clone_index(x, seen.front().frame);
   const Eigen::Vector3d& p_from = left_camera(from);
@@ -135,9 +133,10 @@ bool TrackUpdate::knows_baseline(const Track& track, const Ekf& ekf) const {
     const int clone = clone_index(x, o.frame);
     if ((left_camera(clone) - p_from).squaredNorm() > (left_camera(to) - p_from).squaredNorm()) to = clone;
   }
-  if (to == from) return false;
+  if (to == from) return 0.0;
   const Eigen::Vector3d& p_to = left_camera(to);
-  const Eigen::RowVector3d along = (p_to - p_from).normalized().transpose();
+  const double way = (p_to - p_from).norm();
+  const Eigen::RowVector3d along = (p_to - p_from).transpose() / way;
   Eigen::Matrix<double, 1, 2 * err::clone_size> J;  // of the way, by the errors of both clones
   J << along * skew(p_from), -along, -along * skew(p_to), along;
   const auto P = [&](int a, int b) {
@@ -145,7 +144,7 @@ bool TrackUpdate::knows_baseline(const Track& track, const Ekf& ekf) const {
   };
   Eigen::Matrix<double, 2 * err::clone_size, 2 * err::clone_size> P_both;
   P_both << P(from, from), P(from, to), P(to, from), P(to, to);
-  return (p_to - p_from).squaredNorm() > kKnownWay * kKnownWay * (J * P_both * J.transpose()).value();
+  return std::abs(inverse_depth) * (J * P_both * J.transpose()).value() / way;
 }
 
 /// The newest that both cameras saw: what is wrong with the others is much the same.

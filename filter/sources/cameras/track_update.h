@@ -3,7 +3,6 @@
 #pragma once
 
 #include <array>
-#include <cstdint>
 #include <vector>
 
 #include "ear/filter_config.h"
@@ -28,13 +27,10 @@ class TrackUpdate {
   void reset() { lens_pattern_.reset(); }
 
  private:
-  /// What a track shows of the state.
-  enum class Finding : std::uint8_t { fits, contradicts, nothing };
-
   void select(const State& x, bool oldest_goes, const TrackTable& tracks);
-  [[nodiscard]] Finding add(const Track& track, const Ekf& ekf);
-  /// Is it known how far the cameras moved, or are apart, that saw it?
-  [[nodiscard]] bool knows_baseline(const Track& track, const Ekf& ekf) const;
+  bool add(const Track& track, const Ekf& ekf);
+  /// Normalized: what the linearisation leaves out of where a feature with this inverse depth [1/m] is seen.
+  [[nodiscard]] double left_out(const Track& track, double inverse_depth, const Ekf& ekf) const;
   [[nodiscard]] const Eigen::Vector3d& left_camera(int clone) const {
     return cameras_[2 * static_cast<std::size_t>(clone)].p_WC;
   }
