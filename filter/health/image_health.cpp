@@ -71,18 +71,18 @@ void ImageHealth::judge(TimeNs t_ns, bool running, const FrameAgreement& seen, c
   const bool known = running && seen.matches > 0;
   const int tracks = statistics.tracks;
   const bool blind = tracks < kFewFeatures;
-  const bool poor = blind || tracks < kSparse * usual_tracks_ || seen.noise > 1.0;
-  const double share = std::max(interval_ / kTracksMemory, 1.0 / (1.0 + counted_));
-  usual_tracks_ += share * (tracks - usual_tracks_);
-  ++counted_;
+  const bool poor = blind || tracks < kSparse * usual_.tracks || seen.noise > 1.0;
+  const double share = std::max(interval_ / kTracksMemory, 1.0 / (1.0 + usual_.images));
+  usual_.tracks += share * (tracks - usual_.tracks);
+  ++usual_.images;
   const double kept = statistics.standing ? 0.0 : std::exp(-interval_ / kLasting);  // at rest the images show rest
   used_ = kept * used_ + statistics.features_used;
   rejected_ = kept * rejected_ + statistics.features_rejected;
   carrying_.add(blind || misfit() || (known && seen.left > kMajority), t_ns);
   left_.add(poor || misfit() || (known && some_off(seen.left, seen.matches)), t_ns);
   if (cameras_ == 2 && !seen.right_skipped) {
-    const bool one_eyed = statistics.stereo < std::max<double>(kFewFeatures, kSparse * usual_stereo_ * tracks);
-    usual_stereo_ += share * (static_cast<double>(statistics.stereo) / std::max(1, tracks) - usual_stereo_);
+    const bool one_eyed = statistics.stereo < std::max<double>(kFewFeatures, kSparse * usual_.stereo * tracks);
+    usual_.stereo += share * (static_cast<double>(statistics.stereo) / std::max(1, tracks) - usual_.stereo);
     right_.add(poor || one_eyed || (known && some_off(seen.right, seen.matches)), t_ns);
   }
   if (crossed(seen)) report(t_ns);

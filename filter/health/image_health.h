@@ -70,6 +70,13 @@ class ImageHealth {
   [[nodiscard]] const FaultState& right() const { return right_; }
 
  private:
+  /// What an image usually shows.
+  struct Usual {
+    double tracks = 0.0;
+    double stereo = 0.0;  ///< share of them that both cameras see
+    int images = 0;
+  };
+
   void judge(TimeNs t_ns, bool running, const FrameAgreement& seen, const FrameStatistics& statistics);
 
   std::size_t cameras_;
@@ -81,9 +88,7 @@ class ImageHealth {
   TimeNs last_ns_ = 0;                ///< of the images
   std::optional<TimeNs> arrival_ns_;  ///< the newest inertial stamp when the last one came
   double interval_ = 0.0;             ///< [s] usual
-  double usual_tracks_ = 0.0;
-  double usual_stereo_ = 0.0;           ///< share of the features that both cameras see
-  int counted_ = 0;                     ///< of those
+  Usual usual_;
   double used_ = 0.0, rejected_ = 0.0;  ///< features, recent ones
 };
 

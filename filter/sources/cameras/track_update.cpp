@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <utility>
 
 #include "filter/ingest/limits.h"
@@ -9,7 +10,7 @@
 namespace ear {
 namespace {
 
-constexpr double kAlike = 2.0;        // measured, docs/decisions/0053: what is left out is alike in many features
+constexpr double kNotAveraged = 2.0;  // measured, docs/decisions/0053: what is left out is alike in many features
 constexpr double kNegligible = 1e-4;  // measured, docs/performance.md: 2e-4 of a frame's information, 12 % of the rows
 
 int clone_index(const State& x, std::uint64_t frame) {
@@ -107,7 +108,7 @@ bool TrackUpdate::add(const Track& track, const Ekf& ekf) {
   const std::optional<InverseDepthPoint> point = triangulate(sightings_);
   if (!point) return false;
   const double sigma = config_.feature_sigma_px / focal_px_;
-  const double noise = std::hypot(1.0, kAlike * left_out(track, point->inverse_depth, ekf) / sigma);
+  const double noise = std::hypot(1.0, kNotAveraged * left_out(track, point->inverse_depth, ekf) / sigma);
   observations_.clear();
   for_each_view(track, x, [&](int clone, std::size_t camera, const Eigen::Vector2d& uv) {
     observations_.push_back(linearize_observation(x, clone, static_cast<int>(camera), *point, uv));
@@ -123,22 +124,23 @@ bool TrackUpdate::add(const Track& track, const Ekf& ekf) {
 /// order. What that leaves out is the square of the way's uncertainty over the way, of the parallax; two cameras are as
 /// far apart as they are. docs/decisions/0053.
 double TrackUpdate::left_out(const Track& track, double inverse_depth, const Ekf& ekf) const {
-  const auto& seen = track.observations;
-  if (std::any_of(seen.begin(), seen.end(), [](const TrackObservation& o) { return o.has_right; })) return 0.0;
-  const State& x = ekf.state();
-  const int from = clone_index(x, seen.front().frame);
-  const Eigen::Vector3d& p_from = left_camera(from);
-  int to = from;
-  for (const TrackObservation& o : seen) {
-    const int clone = clone_index(x, o.frame);
-    if ((left_camera(clone) - p_from).squaredNorm() > (left_camera(to) - p_from).squaredNorm()) to = clone;
-  }
-  if (to == from) return 0.0;
-  const Eigen::Vector3d& p_to = left_camera(to);
+  if (sightings_.size() > track.observations.size()) return 0.0;  // a right camera saw it, too
+  const Eigen::Vector3d& p_from = sightings_.front().p_WC;
+  const auto farthest =
+      std::max_element(sightings_.begin(), sightings_.end(), [&](const Sighting& a, const Sighting& b) {
+        return (a.p_WC - p_from).squaredNorm() < (b.p_WC - p_from).squaredNorm();
+      });
+  if (farthest == sightings_.begin()) return 0.0;
+  const Eigen::Vector3d& p_to = farthest->p_WC;
   const double way = (p_to - p_from).norm();
   const Eigen::RowVector3d along = (p_to - p_from).transpose() / way;
   Eigen::Matrix<double, 1, 2 * err::clone_size> J;  // of the way, by the errors of both clones
   J << along * skew(p_from), -along, -along * skew(p_to), along;
+  const auto clone_of = [&](std::ptrdiff_t sighting) {
+    return clone_index(ekf.state(), track.observations[static_cast<std::size_t>(sighting)].frame);
+  };
+  const int from = clone_of(0);
+  const int to = clone_of(farthest - sightings_.begin());
   const auto P = [&](int a, int b) {
     return ekf.covariance().matrix().block<err::clone_size, err::clone_size>(err::clone(a), err::clone(b));
   };

@@ -29,11 +29,9 @@ class TrackUpdate {
  private:
   void select(const State& x, bool oldest_goes, const TrackTable& tracks);
   bool add(const Track& track, const Ekf& ekf);
-  /// Normalized: what the linearisation leaves out of where a feature with this inverse depth [1/m] is seen.
+  /// Normalized: what the linearisation leaves out of where the feature of `sightings_`, with this inverse depth [1/m],
+  /// is seen.
   [[nodiscard]] double left_out(const Track& track, double inverse_depth, const Ekf& ekf) const;
-  [[nodiscard]] const Eigen::Vector3d& left_camera(int clone) const {
-    return cameras_[2 * static_cast<std::size_t>(clone)].p_WC;
-  }
   void add_to_pattern(const Track& track, const CameraState& cameras);
   void log(const Ekf& ekf, Records& records) const;
 
