@@ -32,10 +32,10 @@ void Covariance::reset(const Eigen::VectorXd& sigma) {
   P_.topLeftCorner(size_, size_).diagonal() = sigma.cwiseAbs2();
 }
 
-void Covariance::propagate(const ErrorTransition& transition, const ScaleEffect& scales,
+void Covariance::propagate(const ErrorTransition& transition, const GyroEffect& by_matrix,
                            const Eigen::Matrix<double, 3, 2>& B, double normal_variance) {
   // delta + B^T theta is the normal's error in the world, which motion does not touch. So delta changes by -B^T times
-  // what theta does: a part of the gyroscope's bias and scales, and noise.
+  // what theta does: a part of the gyroscope's bias and matrix, and noise.
   constexpr int n = err::normal + 2;  // what changes
   const Eigen::Matrix<double, 3, 2> gyro_to_normal = -transition.Phi.block<3, 3>(err::theta, err::b_g).transpose() * B;
   const auto carry = [&](auto& M) {
@@ -44,16 +44,16 @@ void Covariance::propagate(const ErrorTransition& transition, const ScaleEffect&
   };
   auto P = P_.topLeftCorner(size_, size_);
   carry(P);
-  Eigen::Matrix<double, 3, n> by_scales = Eigen::Matrix<double, 3, n>::Zero();
-  by_scales.leftCols<9>() = scales.transpose();
-  by_scales.rightCols<2>() = -scales.topRows<3>().transpose() * B;
+  Eigen::Matrix<double, 9, n> effect = Eigen::Matrix<double, 9, n>::Zero();
+  effect.leftCols<9>() = by_matrix.transpose();
+  effect.rightCols<2>() = -by_matrix.topRows<3>().transpose() * B;
   for (int column = 0; column < n; ++column) {
     if (column >= err::b_g && column < err::normal) continue;  // they do nothing to the biases
-    P.col(column).noalias() += P.middleCols<3>(err::gyro_scale).lazyProduct(by_scales.col(column));
+    P.col(column).noalias() += P.middleCols<9>(err::gyro_matrix).lazyProduct(effect.col(column));
   }
   Eigen::Matrix<double, n, n> corner = P.topLeftCorner<n, n>().transpose();
   carry(corner);
-  corner.noalias() += P.block<3, n>(err::gyro_scale, 0).transpose().lazyProduct(by_scales);
+  corner.noalias() += P.block<9, n>(err::gyro_matrix, 0).transpose().lazyProduct(effect);
   corner.topLeftCorner<err::imu_size, err::imu_size>() += transition.Q;
   const Eigen::Matrix<double, 2, 3> to_normal = -B.transpose();
   const Eigen::Matrix<double, 2, err::imu_size> normal_Q = to_normal * transition.Q.topRows<3>();

@@ -86,7 +86,7 @@ std::optional<TimeNs> Ekf::propagate(const ImuBuffer& samples, TimeNs t_ns, cons
   std::optional<TimeNs> uncertain_ns;
   if (t_ns <= state_.imu.t_ns) return uncertain_ns;
   std::optional<ErrorTransition> total;
-  ScaleEffect scale_effect = ScaleEffect::Zero();
+  GyroEffect by_matrix = GyroEffect::Zero();
   const double duration = seconds_between(state_.imu.t_ns, t_ns);
   samples.for_each_piece(
       state_.imu.t_ns, t_ns,
@@ -99,7 +99,7 @@ std::optional<TimeNs> Ekf::propagate(const ImuBuffer& samples, TimeNs t_ns, cons
         // Without a camera turns about the vertical are left out: the heading would follow wheels whose track width is
         // a guess.
         const Eigen::Vector3d measured_B = gyro_B - state_.imu.b_g;
-        chain(scale_effect, step, calibration_.cameras.empty() ? tilting(state_.imu.R_WB, measured_B) : measured_B);
+        chain(by_matrix, step, calibration_.cameras.empty() ? tilting(state_.imu.R_WB, measured_B) : measured_B);
         if (total) {
           chain(kernels_, *total, step);
         } else {
@@ -114,7 +114,7 @@ std::optional<TimeNs> Ekf::propagate(const ImuBuffer& samples, TimeNs t_ns, cons
       });
   state_.imu.t_ns = t_ns;
   const double distance = state_.imu.v_W.norm() * duration;
-  covariance_.propagate(total.value_or(ErrorTransition{}), scale_effect, tangent_basis(state_.ground.n_W),
+  covariance_.propagate(total.value_or(ErrorTransition{}), by_matrix, tangent_basis(state_.ground.n_W),
                         normal_walk * normal_walk * distance);
   return uncertain_ns;
 }

@@ -17,7 +17,7 @@
 
 namespace ear {
 
-/// What an update does to the calibration of the cameras, and to the gyroscope's scales. Without a camera these are
+/// What an update does to the calibration of the cameras, and to the gyroscope's matrix. Without a camera these are
 /// always considered.
 enum class CameraUpdate : std::uint8_t {
   learned,    ///< it is corrected as everything else

@@ -69,7 +69,7 @@ ErrorTransition error_transition(const ImuState& x, const Eigen::Vector3d& gyro_
   B_gyro.middleRows<3>(3) = -x.R_WB * gamma_derivative<1>(phi, f_B) * (dt * dt) + skew(v_next) * B_gyro.topRows<3>();
   B_gyro.bottomRows<3>() =
       -x.R_WB * gamma_derivative<2>(phi, f_B) * (dt * dt * dt) + skew(p_next) * B_gyro.topRows<3>();
-  B_gyro *= x.gyro_scale.asDiagonal();
+  B_gyro *= x.gyro_matrix;
   Eigen::Matrix<double, 9, 3> B_accel;
   B_accel.topRows<3>().setZero();
   B_accel.middleRows<3>(3) = -x.R_WB * G1 * dt;
@@ -106,9 +106,17 @@ void chain(const FilterKernels& kernels, ErrorTransition& total, const ErrorTran
   carry(total.Phi);
 }
 
-void chain(ScaleEffect& total, const ErrorTransition& step, const Eigen::Vector3d& measured_B) {
-  total = (step.Phi.topLeftCorner<9, 9>() * total).eval() -
-          step.Phi.block<9, 3>(err::theta, err::b_g) * measured_B.asDiagonal();
+/// rate = M^ (I + E) measured: each column of E comes in where the bias does.
+void chain(GyroEffect& total, const ErrorTransition& step, const Eigen::Vector3d& measured_B) {
+  const auto& Phi = step.Phi;
+  const auto theta = total.topRows<3>();
+  auto nu = total.middleRows<3>(err::nu);
+  auto rho = total.bottomRows<3>();
+  rho += Phi.block<3, 3>(err::rho, err::nu).lazyProduct(nu) + Phi.block<3, 3>(err::rho, err::theta).lazyProduct(theta);
+  nu += Phi.block<3, 3>(err::nu, err::theta).lazyProduct(theta);
+  for (int axis = 0; axis < 3; ++axis) {
+    total.middleCols<3>(3 * axis) -= measured_B(axis) * Phi.block<9, 3>(err::theta, err::b_g);
+  }
 }
 
 Eigen::Vector3d tilting(const Eigen::Matrix3d& R_WB, const Eigen::Vector3d& rate_B) {

@@ -61,12 +61,12 @@ struct BodyMotion {
 /// `total` followed by `step`.
 void chain(const FilterKernels& kernels, ErrorTransition& total, const ErrorTransition& step);
 
-/// What errors of the gyroscope's scales do to (theta, nu, rho).
-using ScaleEffect = Eigen::Matrix<double, 9, 3>;
+/// What errors of the gyroscope's matrix do to (theta, nu, rho).
+using GyroEffect = Eigen::Matrix<double, 9, 9>;
 
 /// `total` followed by `step`, in which the gyroscope measures `measured_B` without its bias [rad/s], or as much of it
 /// as is to count.
-void chain(ScaleEffect& total, const ErrorTransition& step, const Eigen::Vector3d& measured_B);
+void chain(GyroEffect& total, const ErrorTransition& step, const Eigen::Vector3d& measured_B);
 
 /// The part of a rate that tilts the body: without what turns it about the vertical.
 [[nodiscard]] Eigen::Vector3d tilting(const Eigen::Matrix3d& R_WB, const Eigen::Vector3d& rate_B);

@@ -1,8 +1,8 @@
 // The state, and what an error of it means. Only boxplus knows the error's definition (docs/filter.md, "State and
 // error"):
 //   R = Exp(theta) R^, v = Exp(theta) v^ + nu, p = Exp(theta) p^ + rho; clones alike; n = Exp(theta) Exp(B delta) n^;
-//   biases and calibration additive, wheels and the gyroscope's scales relative, rotations of the cameras R = Exp(phi)
-//   R^, of the odometer R = R^ Exp(phi).
+//   biases and calibration additive, wheels relative, rotations of the cameras R = Exp(phi) R^, of the odometer R = R^
+//   Exp(phi), the gyroscope's matrix M = M^ (I + E).
 #pragma once
 
 #include <Eigen/Core>
@@ -19,7 +19,7 @@ inline const Eigen::Vector3d kGravity_W{0.0, 0.0, -9.81};  ///< [m/s^2]
 
 /// Where each quantity's error stands in the error vector. What wheels and lasers measure lies together, before the
 /// camera's part; that is last, so that its measurements touch one contiguous range too: the calibration of the
-/// cameras, with the gyroscope's scales, which cameras show, then the clones, oldest first.
+/// cameras, with the gyroscope's matrix, which cameras show, then the clones, oldest first.
 namespace err {
 inline constexpr int theta = 0, nu = 3, rho = 6, b_g = 9, b_a = 12;
 inline constexpr int imu_size = 15;
@@ -38,8 +38,8 @@ inline constexpr int lenses = camera + poses_size;  ///< focal length, principal
 inline constexpr int lens_size = 3;
 [[nodiscard]] constexpr int lens(int index) { return lenses + lens_size * index; }
 inline constexpr int time_offset = lenses + 2 * lens_size;  ///< [s]
-inline constexpr int gyro_scale = time_offset + 1;          ///< of each axis of the gyroscope, relative: 3
-inline constexpr int calibration_size = 22;
+inline constexpr int gyro_matrix = time_offset + 1;         ///< E of the gyroscope, column by column: 9
+inline constexpr int calibration_size = 28;
 inline constexpr int clones = camera + calibration_size;
 inline constexpr int clone_size = 6;  ///< theta, rho
 [[nodiscard]] constexpr int clone(int index) { return clones + clone_size * index; }
@@ -70,13 +70,13 @@ struct ImuState {
   Eigen::Vector3d p_WB = Eigen::Vector3d::Zero();
   Eigen::Vector3d b_g = Eigen::Vector3d::Zero();
   Eigen::Vector3d b_a = Eigen::Vector3d::Zero();
-  Eigen::Vector3d gyro_scale = Eigen::Vector3d::Ones();  ///< of each axis: true over measured rate
+  /// M, true = M measured rate: scales of the axes, and where they point against those of the accelerometer, which are
+  /// the body's.
+  Eigen::Matrix3d gyro_matrix = Eigen::Matrix3d::Identity();
 
   [[nodiscard]] Pose T_WB() const { return {R_WB, p_WB}; }
   /// The body's rate where the gyroscope measures `gyro_B` [rad/s].
-  [[nodiscard]] Eigen::Vector3d rate_B(const Eigen::Vector3d& gyro_B) const {
-    return gyro_scale.cwiseProduct(gyro_B - b_g);
-  }
+  [[nodiscard]] Eigen::Vector3d rate_B(const Eigen::Vector3d& gyro_B) const { return gyro_matrix * (gyro_B - b_g); }
 };
 
 /// The plane that the wheels stand on.

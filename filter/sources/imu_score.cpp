@@ -39,7 +39,7 @@ std::optional<Innovation> ImuScore::add_excess(const ExcessTurn& turn, const Imu
   const double kept = std::exp(-std::max(0.0, since) / kStale);
   e.count = kept * e.count + 1.0;
   e.apparent = kept * e.apparent + rate_B.squaredNorm() * (mounting + variance(err::lens(0))) +
-               rate_B.squaredNorm() * variance(err::gyro_scale) + change.squaredNorm() * variance(err::time_offset);
+               rate_B.squaredNorm() * variance(err::gyro_matrix) + change.squaredNorm() * variance(err::time_offset);
   e.rate_B = rate_B;
   e.last_ns = t_ns;
   const double noise = motion.turn_variance * std::pow(learned().gyro, 2);

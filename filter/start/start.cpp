@@ -217,7 +217,10 @@ Eigen::VectorXd Start::sigma() const {
       sigma.segment<3>(err::stereo + 3) = (by_target.square() + prior.stereo_position * prior.stereo_position).sqrt();
     }
   }
-  sigma.segment<3>(err::gyro_scale).setConstant(calibration_.cameras.empty() ? prior.gyro_unseen : prior.gyro_scale);
+  // Without a camera nothing shows where the gyroscope's axes point.
+  Eigen::Matrix3d gyro = prior.gyro_unseen * Eigen::Matrix3d::Identity();
+  if (!calibration_.cameras.empty()) gyro.setConstant(prior.gyro_scale);
+  sigma.segment<9>(err::gyro_matrix) = gyro.reshaped();
   for (std::size_t i = 0; online.intrinsics && i < calibration_.cameras.size(); ++i) {
     sigma.segment<err::lens_size>(err::lens(static_cast<int>(i))) = lens_sigma(prior, calibration_.cameras[i]);
   }

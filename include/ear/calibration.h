@@ -54,7 +54,7 @@ struct ImuCalibration {
   double accel_random_walk = 3e-4;         ///< [m/s^3/sqrt(Hz)]
   std::optional<double> gyro_bias_sigma;   ///< [rad/s] of the bias at the start, about zero
   std::optional<double> accel_bias_sigma;  ///< [m/s^2]
-  std::optional<double> gyro_scale_sigma;  ///< relative
+  std::optional<double> gyro_scale_sigma;  ///< relative; also of one axis in turns about another
 };
 
 /// Two wheels on one axle. O is the middle of the axle: x forward, y left along the axle, z up.

@@ -65,15 +65,15 @@ TEST_CASE("covariance: propagation and cloning are the full matrix products") {
   const ErrorTransition transition = random_transition(rng);
   const Eigen::MatrixXd cloned = P.matrix();
   const Eigen::Matrix<double, 3, 2> B = tangent_basis(Eigen::Vector3d(0.2, 0.3, 0.9).normalized());
-  const ScaleEffect scales = random_matrix(rng, 9, 3);
-  P.propagate(transition, scales, B, 0.02);
+  const GyroEffect by_matrix = random_matrix(rng, 9, 9);
+  P.propagate(transition, by_matrix, B, 0.02);
   // The normal's error in the world, delta + B^T theta, stays; it walks by itself.
   Eigen::MatrixXd to_world = Eigen::MatrixXd::Identity(P.size(), P.size());
   to_world.block<2, 3>(err::normal, err::theta) = B.transpose();
   Eigen::MatrixXd Phi = Eigen::MatrixXd::Identity(P.size(), P.size());
   Eigen::MatrixXd Q = Eigen::MatrixXd::Zero(P.size(), P.size());
   Phi.topLeftCorner<err::imu_size, err::imu_size>() = transition.Phi;
-  Phi.block<9, 3>(0, err::gyro_scale) = scales;
+  Phi.block<9, 9>(0, err::gyro_matrix) = by_matrix;
   Q.topLeftCorner<err::imu_size, err::imu_size>() = transition.Q;
   Q.diagonal().segment<2>(err::normal).setConstant(0.02);
   const Eigen::MatrixXd to_body = to_world.inverse();

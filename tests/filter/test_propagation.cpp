@@ -74,13 +74,13 @@ TEST_CASE("propagation: Phi is the derivative, biases included") {
   }
 }
 
-TEST_CASE("propagation: what the gyroscope's scales do is the derivative") {
+TEST_CASE("propagation: what the gyroscope's matrix does is the derivative") {
   std::mt19937_64 rng{14};
   for (int trial = 0; trial < 20; ++trial) {
     CAPTURE(trial);
     const ImuState start = random_state(rng, 0).imu;
     const double dt = 0.01;
-    ScaleEffect effect = ScaleEffect::Zero();
+    GyroEffect effect = GyroEffect::Zero();
     ImuState end = start;
     std::vector<Eigen::Vector3d> gyro, accel;
     for (std::size_t i = 0; i < 5; ++i) {
@@ -90,9 +90,9 @@ TEST_CASE("propagation: what the gyroscope's scales do is the derivative") {
       end = integrate(end, gyro[i], accel[i], dt);
     }
     check_jacobian(
-        [&](const Eigen::VectorXd& scale) -> Eigen::VectorXd {
+        [&](const Eigen::VectorXd& E) -> Eigen::VectorXd {
           ImuState x = start;
-          x.gyro_scale.array() *= 1.0 + scale.array();
+          x.gyro_matrix *= Eigen::Matrix3d::Identity() + Eigen::Matrix3d(E.reshaped(3, 3));
           for (std::size_t i = 0; i < gyro.size(); ++i) x = integrate(x, gyro[i], accel[i], dt);
           return imu_difference(x, end).head<9>();
         },

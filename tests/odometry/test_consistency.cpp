@@ -29,9 +29,9 @@ constexpr double kMoving = 5.0;     // [s] from here on: it has left its start, 
 // is inside the band for 95 % of the time on average over many draws of seeds, but for less in some. With errors that
 // are correlated like that, in 400 draws of twelve cases, one draw in a hundred had a case inside for less than 0.46,
 // an average below 0.88, or a mean more than 4.2 of its standard deviations off 3; one in two a case below 0.83.
-constexpr double kShare = 0.5;         // of the time inside, in each case and quantity
-constexpr double kAverageShare = 0.9;  // the same, over all cases and quantities
-constexpr double kSigmas = 4.0;        // so far may the mean over runs and time be off 3
+constexpr double kShare = 0.5;          // of the time inside, in each case and quantity
+constexpr double kAverageShare = 0.88;  // the same, over all cases and quantities
+constexpr double kSigmas = 4.0;         // so far may the mean over runs and time be off 3
 
 constexpr std::uint64_t kFirstSeed = 7001;  // not used in development
 constexpr int kGroups = 4;                  // of kRuns seeds each: kFirstSeed, kFirstSeed + 100, ...
@@ -48,15 +48,16 @@ struct Mean {
   double nees, sigma;
 };
 
-/// As measured with the shipped settings, where 3 is consistent. All are less, by 2.2 to 8.8 of their standard
-/// deviations: the covariance is too large there, since the settings are for rougher ground than the simulator's.
+/// As measured with the shipped settings, where 3 is consistent. All are less, by 1.3 to 15 of their standard
+/// deviations: the covariance is too large there, since the settings are for rougher ground than the simulator's and a
+/// gyroscope whose scales and axes are off.
 struct Stated {
   const char* sequence;
   Mean position, orientation;
 };
-constexpr std::array kStated = {Stated{"flat1", {1.81, 0.21}, {2.30, 0.14}},
-                                Stated{"wave1", {1.68, 0.15}, {2.55, 0.16}},
-                                Stated{"fly1", {2.48, 0.24}, {2.39, 0.12}}};
+constexpr std::array kStated = {Stated{"flat1", {1.85, 0.23}, {1.70, 0.15}},
+                                Stated{"wave1", {1.76, 0.17}, {2.16, 0.14}},
+                                Stated{"fly1", {2.65, 0.26}, {1.59, 0.09}}};
 constexpr double kStatedSigmas = 3.0;  // so far may a change of the filter move the mean, either way
 
 struct Nees {

@@ -4,6 +4,8 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -86,21 +88,21 @@ struct Drive {
   double end_off = 0.0;      ///< [m]
 };
 
-const Film& film() {
-  static const Film kFilm([] {
-    simulator::Options options;
-    options.seed = 12;
-    options.duration = 16.0;
-    options.camera_rate_hz = 10.0;
-    return options;
-  }());
-  return kFilm;
+constexpr std::uint64_t kSeed = 12;
+
+const Film& film(std::uint64_t seed) {
+  static std::map<std::uint64_t, Film> films;
+  simulator::Options options;
+  options.seed = seed;
+  options.duration = 16.0;
+  options.camera_rate_hz = 10.0;
+  return films.try_emplace(seed, options).first->second;
 }
 
 /// Drives along the film; images of some times may be missing, and `steps` are made after each image [s].
 template <typename Missing>
-Drive drive(const std::vector<double>& steps, const Missing& missing) {
-  const Simulation& simulation = film().simulation;
+Drive drive(const std::vector<double>& steps, const Missing& missing, std::uint64_t seed = kSeed) {
+  const Simulation& simulation = film(seed).simulation;
   Drive result;
   Odometry odometry = OdometryFactory::make(
       Config{}, simulation.calibration(),
@@ -128,7 +130,7 @@ Drive drive(const std::vector<double>& steps, const Missing& missing) {
       result.aided_by_cameras += estimate->health.aiding == Aiding::cameras_and_wheels ? 1 : 0;
     }
     if (delivery.stream != simulator::SensorStream::camera) continue;
-    const StereoFrame frame = film().frame(delivery.index);
+    const StereoFrame frame = film(seed).frame(delivery.index);
     const double t = seconds_between(first_ns, frame.t_ns);
     if (missing(t)) continue;
     const std::optional<Estimate> estimate = odometry.add_stereo(frame);
@@ -174,16 +176,22 @@ TEST_CASE("steps between images: tracks go on, the next image is predicted from 
 
 TEST_CASE("steps while images are missing: better than to wait for the next image") {
   const auto missing = [](double t) { return t > 6.0 && std::fmod(t, 3.0) < 0.45; };
-  const Drive without = drive({}, missing);
-  const Drive with = drive({0.15, 0.2, 0.25, 0.3, 0.35, 0.4}, missing);
-  MESSAGE("rms without steps " << without.rms << ", with " << with.rms << "; features used " << without.used_by_images
-                               << ", " << with.used_by_images << "; prediction off by up to "
-                               << largest(without.seen.prediction_off) << ", " << largest(with.seen.prediction_off));
-  CHECK(with.steps >= 15);
-  CHECK(with.used_by_steps == 0);
-  CHECK(largest(with.seen.prediction) > 0.2);
-  CHECK(largest(with.seen.prediction_off) < 0.006);
-  CHECK(with.rms < 1.02 * without.rms);
+  double ratios = 1.0;  // one seed scatters by 10 %
+  constexpr std::uint64_t kSeeds = 5;
+  for (std::uint64_t seed = kSeed; seed < kSeed + kSeeds; ++seed) {
+    CAPTURE(seed);
+    const Drive without = drive({}, missing, seed);
+    const Drive with = drive({0.15, 0.2, 0.25, 0.3, 0.35, 0.4}, missing, seed);
+    MESSAGE("rms without steps " << without.rms << ", with " << with.rms << "; features used " << without.used_by_images
+                                 << ", " << with.used_by_images << "; prediction off by up to "
+                                 << largest(without.seen.prediction_off) << ", " << largest(with.seen.prediction_off));
+    CHECK(with.steps >= 15);
+    CHECK(with.used_by_steps == 0);
+    CHECK(largest(with.seen.prediction) > 0.2);
+    CHECK(largest(with.seen.prediction_off) < 0.006);
+    ratios *= with.rms / without.rms;
+  }
+  CHECK(std::pow(ratios, 1.0 / kSeeds) < 1.02);
 }
 
 /// By wheels and inertial samples alone, a step every 50 ms.

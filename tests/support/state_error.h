@@ -63,7 +63,8 @@ namespace ear::test {
     d.segment<err::lens_size>(err::lens(camera)) << a.focal_length - b.focal_length,
         a.principal_point - b.principal_point;
   }
-  d.segment<3>(err::gyro_scale) = truth.imu.gyro_scale.cwiseQuotient(estimate.imu.gyro_scale).array() - 1.0;
+  const Eigen::Matrix3d matrix = estimate.imu.gyro_matrix.inverse() * truth.imu.gyro_matrix;
+  d.segment<9>(err::gyro_matrix) = (matrix - Eigen::Matrix3d::Identity()).reshaped();
   d(err::time_offset) = truth.camera.time_offset - estimate.camera.time_offset;
   for (std::size_t i = 0; i < estimate.clones.size(); ++i) {
     d.segment<6>(err::clone(static_cast<int>(i))) = invariant_difference(truth.clones[i].T_WB, estimate.clones[i].T_WB);

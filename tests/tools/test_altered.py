@@ -60,13 +60,14 @@ class Copies(unittest.TestCase):
 
 
 class Miscalibrated(unittest.TestCase):
-    """A camera and wheels, 300 times."""
+    """A sensor of each kind, 300 times."""
 
     SENSORS = {
         "cam0": ("T_BS:\n  data: [0, 0, 1, 0.1,\n         -1, 0, 0, 0,\n         0, -1, 0, 0,\n         0, 0, 0, 1]\n"
                  "intrinsics: [400.0, 410.0, 320.0, 240.0]  # fu, fv, cu, cv\n"),
         "encoder0": ("T_BS: {rows: 4, cols: 4, data: [1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,1]}\nwheel_radius: [0.1, 0.2]\n"
                      "wheel_separation: 0.5\n"),
+        "imu0": "sensor_type: imu\n",
         "laser0": "beams:\n  - {name: rear, origin: [0.1, 0.0, 0.0], direction: [0.0, 0.0, -1.0]}\n",
     }
 
@@ -77,7 +78,8 @@ class Miscalibrated(unittest.TestCase):
         for sensor, text in self.SENSORS.items():
             (self.folder / "small/mav0" / sensor).mkdir(parents=True)
             (self.folder / "small/mav0" / sensor / "sensor.yaml").write_text(text, encoding="utf-8")
-            (self.folder / "small/mav0" / sensor / "data.csv").write_text("#t\n1000000000,0\n", encoding="utf-8")
+            values = "1,0,0,0,0,0" if sensor == "imu0" else "0"
+            (self.folder / "small/mav0" / sensor / "data.csv").write_text(f"#t\n1000000000,{values}\n", encoding="utf-8")
 
     def drawn(self, sensor, key):
         """The list with this key in each of the copies."""
@@ -87,6 +89,10 @@ class Miscalibrated(unittest.TestCase):
                 miscalibrated.miscalibrated(self.folder / "small", seed, folder)
             text = (folder / "mav0" / sensor / "sensor.yaml").read_text(encoding="utf-8")
             yield [float(x) for x in re.search(key + r": *\[?([^\]\n]*)", text)[1].split(",")]
+
+    def last_row(self, seed, sensor):
+        path = self.folder / f"copy{seed}/mav0" / sensor / "data.csv"
+        return path.read_text(encoding="utf-8").split()[-1].split(",")
 
     def assert_sigma(self, values, expected):
         self.assertLess(abs(statistics.mean(values)), 4.0 * expected / math.sqrt(300))
@@ -107,9 +113,11 @@ class Miscalibrated(unittest.TestCase):
         self.assert_sigma([w / 0.5 - 1.0 for w, in self.drawn("encoder0", "wheel_separation")], 5e-3)
         self.assert_sigma([math.degrees(d[0]) for d in self.drawn("laser0", "direction")], 0.3)
         self.assert_sigma([o[2] for o in self.drawn("laser0", "origin")], 2e-3)
-        stamps = [int((self.folder / f"copy{i}/mav0/encoder0/data.csv").read_text(encoding="utf-8").split()[-1].split(",")[0])
-                  for i in range(300)]
+        stamps = [int(self.last_row(i, "encoder0")[0]) for i in range(300)]
         self.assert_sigma([1e-9 * t - 1.0 for t in stamps], 2e-3)
+        rates = [[float(x) for x in self.last_row(i, "imu0")[1:4]] for i in range(300)]  # of a turn about x by 1 rad/s
+        self.assert_sigma([x - 1.0 for x, _, _ in rates], 3e-3)
+        self.assert_sigma([z for _, _, z in rates], 3e-3)
 
     def test_leaves_the_original(self):
         list(self.drawn("cam0", "data"))
@@ -143,6 +151,7 @@ class Hop(unittest.TestCase):
         "wheels_lost": 0.012,
         "camera_third": 0.02,
         "gyro_scale": 0.01,  # 22 mm where the scale is no state
+        "gyro_axes": 0.01,  # 11.7 mm where it is no state where they point
         "wheels_exchanged": 0.02,
         "imu_spikes": 0.012,
         "camera_repeated": 0.015,

@@ -11,6 +11,8 @@ import shutil
 from dataclasses import dataclass
 from typing import Callable
 
+from real.layout import rotate
+
 GYRO, ACCEL = (1, 2, 3), (4, 5, 6)  # columns of imu0
 CAMERAS = ("cam0", "cam1")
 WHEELS = "encoder0"
@@ -129,6 +131,17 @@ def scattered_stamps(copy):
             [str(int(row[0]) + offsets.setdefault(milliseconds(row), round(draws.gauss(0.0, 3e6)))), *row[1:]] for row in rows])
 
 
+def through_matrix(matrix):
+    """What a gyroscope measures that shows the rate times this matrix."""
+    def change(rows):
+        for row in rows:
+            for column, rate in zip(GYRO, rotate(matrix, [float(row[column]) for column in GYRO])):
+                row[column] = repr(rate)
+        return rows
+
+    return change
+
+
 def noisy_imu(copy):
     draws = random.Random(3)
     copy.change(["imu0"], each_value(GYRO, lambda x, _: x + draws.gauss(0.0, 0.05)))
@@ -228,6 +241,9 @@ def begin_late(copy):
     copy.change(copy.sensors(), lambda rows: [row for row in rows if int(row[0]) >= begin])
 
 
+LEANING = [[1.0, 0.01, 0.01], [0.01, 1.0, 0.01], [0.01, 0.01, 1.0]]
+
+
 @dataclass(frozen=True)
 class Alteration:
     name: str
@@ -260,6 +276,7 @@ ALTERATIONS = [
     Alteration("gyro_bias", "gyroscope's bias of 0.05 rad/s in roll and yaw",
                on(["imu0"], each_value((1, 3), lambda x, column: x + (0.05 if column == 3 else -0.05)))),
     Alteration("gyro_scale", "gyroscope that measures 1 % too much", on(["imu0"], each_value(GYRO, lambda x, _: 1.01 * x))),
+    Alteration("gyro_axes", "gyroscope whose axes measure 1 % of the turns about the other two", on(["imu0"], through_matrix(LEANING))),
     Alteration("accel_bias", "accelerometer's bias of 0.7 m/s^2 in x and y, nine times what the prior allows",
                on(["imu0"], each_value((4, 5), lambda x, column: x + (0.7 if column == 4 else -0.7)))),
     Alteration("gyro_degrees", "gyroscope in degrees per second", on(["imu0"], each_value(GYRO, lambda x, _: 57.29578 * x))),

@@ -1,4 +1,4 @@
-"""Recordings whose calibration is as wrong as on real rigs: sensor.yaml and the clocks, drawn at random.
+"""Recordings whose calibration is as wrong as on real rigs: sensor.yaml, clocks and gyroscope, drawn at random.
 
 The standard deviations are those of `ear simulate --calibration-error 1` (docs/simulator.md). What a recording lacks is left out;
 the errors that a real one has already are added to.
@@ -9,7 +9,7 @@ import random
 import re
 import statistics
 
-from real.altered import CAMERAS, Copy, later
+from real.altered import CAMERAS, Copy, later, through_matrix
 from real.judge import figure
 from real.layout import BadInput, multiply, rotate, turned
 
@@ -87,6 +87,7 @@ def miscalibrated(recording, seed, folder):
     change_beams(copy, draws)
     for sensors in (CAMERAS, ["encoder0"], ["laser0"]):
         copy.change(sensors, later(draws.gauss(0.0, 2e-3)))
+    copy.change(["imu0"], through_matrix([[(i == j) + draws.gauss(0.0, 3e-3) for j in range(3)] for i in range(3)]))
     return folder
 
 

@@ -54,7 +54,7 @@ WheelRows linearize_wheels(const State& x, const Eigen::Matrix3d& R_WB, const Ei
   rows.J_gyro.topRows<3>() = rows.direction * v_rate;
   rows.J_gyro.row(WheelRows::yaw_rate) = n.transpose();
   if (terrain) rows.J_gyro.row(WheelRows::speed) -= r * y.transpose();
-  rows.J_gyro *= x.imu.gyro_scale.asDiagonal();
+  rows.J_gyro *= x.imu.gyro_matrix;
 
   auto& H = rows.H;
   H.middleCols<3>(nu).topRows<3>() = rows.direction * R_WB.transpose();
