@@ -37,11 +37,11 @@ Covariance filled(std::mt19937_64& rng) {
   Covariance P(err::clone(4));
   P.reset(Eigen::VectorXd::Constant(err::clones, 0.5));
   for (int i = 0; i < 2; ++i) {
-    P.propagate(random_transition(rng), random_matrix(rng, 9, 3),
+    P.propagate(random_transition(rng), random_matrix(rng, 9, 9),
                 tangent_basis(Eigen::Vector3d(0.1, -0.2, 0.97).normalized()), 0.01);
     P.append_clone(random_matrix(rng, 6, 1));
   }
-  P.propagate(random_transition(rng), random_matrix(rng, 9, 3),
+  P.propagate(random_transition(rng), random_matrix(rng, 9, 9),
               tangent_basis(Eigen::Vector3d(0.1, -0.2, 0.97).normalized()), 0.01);
   return P;
 }
