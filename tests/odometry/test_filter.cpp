@@ -4,6 +4,7 @@
 #include <Eigen/Eigenvalues>
 #include <limits>
 #include <random>
+#include <utility>
 
 #include "filter/filter.h"
 #include "tests/support/simulated_run.h"
@@ -192,13 +193,12 @@ TEST_CASE("filter: learns the calibration, and leaves it alone where it is froze
 
   // Camera and gyroscope show how they are turned against each other. Which of them is turned against the accelerometer
   // is known as well as the gyroscope's axes are.
-  for (const double gyro_axes : {FilterConfig{}.prior.gyro_scale, 1e-4}) {
-    CAPTURE(gyro_axes);
+  for (const auto& [gyro_axes, share] : {std::pair{FilterConfig{}.prior.gyro_scale, 0.7}, std::pair{1e-4, 0.5}}) {
     FilterConfig config;
     config.prior.gyro_scale = gyro_axes;
+    CAPTURE(config.prior.gyro_scale);
     Filter learning(config, simulation.calibration());
     run_filter(learning, simulation);
-    const double share = gyro_axes < 1e-3 ? 0.5 : 0.7;
     CHECK(angle_to_truth(learning.ekf().state().camera.T_BC0.R) < share * angle_to_truth(T_told.linear()));
     CHECK(std::abs(learning.ekf().state().camera.time_offset - offset_true) < 0.5e-3);
   }
