@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "calibration/grounded.h"
-#include "smoother/imu_factor.h"
+#include "calibration/inertial_factor.h"
 
 namespace ear::calibration {
 namespace {
@@ -90,7 +90,7 @@ void Batch::build(double gate) {
   problem_ = std::make_unique<ceres::Problem>(options);
   terms_.clear();
   for (Segment& segment : segments_) {
-    renew_paths(segment, given_.imu.gyro_noise);
+    renew_paths(segment, parameters_.gyro, given_.imu.gyro_noise);
     if (!given_.cameras.empty()) place_points(segment, cameras_now());
   }
   add_blocks();
@@ -145,9 +145,9 @@ void Batch::add_inertial(std::size_t s) {
   for (std::size_t i = 0; i + 1 < keyframes.size(); ++i) {
     Keyframe& a = keyframes[i];
     Keyframe& b = keyframes[i + 1];
-    const auto measured = preintegrated(a.since, state_of(a), given_.imu);
-    add_term({Term::inertial, nullptr, s, i, 0, a.t_ns}, new smoother::ImuFactor(measured), nullptr,
-             {a.pose.data(), a.motion.data(), b.pose.data(), b.motion.data()});
+    const Preintegrated measured = preintegrated(a.since, state_of(a), parameters_.gyro, given_.imu);
+    add_term({Term::inertial, nullptr, s, i, 0, a.t_ns}, new InertialFactor(measured), nullptr,
+             {a.pose.data(), a.motion.data(), b.pose.data(), b.motion.data(), parameters_.gyro.data()});
   }
 }
 

@@ -27,7 +27,7 @@ void Batch::learn_noise() {
   std::optional<double> slip;
   noise_.roll.common = 0.0;
   for (std::size_t i = 0; i < segments_.size(); ++i) {
-    renew_paths(segments_[i], given_.imu.gyro_noise);
+    renew_paths(segments_[i], parameters_.gyro, given_.imu.gyro_noise);
     slip = std::max(slip, slip_of(segments_[i], setting));  // nothing is less than any
     noise_.roll.common = std::max(noise_.roll.common, common_slip(*this, i, setting).value_or(0.0));
   }

@@ -38,6 +38,15 @@ std::vector<InertialPiece> pieces_between(const std::vector<ImuSample>& imu, Tim
   return pieces;
 }
 
+Eigen::Matrix3d gyro_matrix(const GyroErrors& errors) {
+  return Eigen::Matrix3d::Identity() + Eigen::Map<const Eigen::Matrix3d>(errors.data());
+}
+
+std::vector<InertialPiece> corrected(std::vector<InertialPiece> pieces, const Eigen::Matrix3d& matrix) {
+  for (InertialPiece& piece : pieces) piece.gyro_B = matrix * piece.gyro_B;
+  return pieces;
+}
+
 std::vector<PathNode> path_along(const std::vector<InertialPiece>& pieces, const NavState& from) {
   std::vector<PathNode> path;
   if (pieces.empty()) return path;
@@ -75,13 +84,32 @@ PathNode at(const std::vector<PathNode>& path, TimeNs t_ns) {
   return node;
 }
 
-smoother::ImuPreintegration preintegrated(const std::vector<InertialPiece>& pieces, const NavState& from,
-                                          const ImuCalibration& noise) {
-  smoother::ImuPreintegration result(from.b_g, from.b_a);
+Preintegrated preintegrated(const std::vector<InertialPiece>& pieces, const NavState& from, const GyroErrors& errors,
+                            const ImuCalibration& noise) {
+  namespace imu_error = smoother::imu_error;
+  Preintegrated result{{from.b_g, from.b_a}, errors, Eigen::Matrix<double, 9, 9>::Zero()};
+  smoother::ImuPreintegration& total = result.motion;
+  Eigen::Matrix<double, 9, 9>& J = result.J_gyro;
+  const Eigen::Matrix3d M = gyro_matrix(errors);
   for (const InertialPiece& piece : pieces) {
     ImuCalibration here = noise;
     if (piece.jump > kStrike) here.accel_noise = std::hypot(noise.accel_noise, 0.5 * piece.jump * std::sqrt(piece.dt));
-    result.add(piece.gyro_B, piece.accel_B, piece.dt, here);
+    const Eigen::Vector3d rate = M * piece.gyro_B;
+    smoother::ImuPreintegration step(from.b_g, from.b_a);
+    step.add(rate, piece.accel_B, piece.dt, here);
+
+    // What was turned until here turns all that follows: Exp(xi) R and with it R dv, R dp of the step.
+    const Eigen::Matrix3d R = total.R_BiBj();
+    const auto xi = J.middleRows<3>(imu_error::xi);
+    auto dv = J.middleRows<3>(imu_error::dv);
+    auto dp = J.middleRows<3>(imu_error::dp);
+    dp += dv * piece.dt - skew(R * step.dp_Bi()) * xi;
+    dv -= skew(R * step.dv_Bi()) * xi;
+    for (const int row : {imu_error::xi, imu_error::dv, imu_error::dp}) {
+      const Eigen::Matrix3d by_rate = -R * step.J_bias().block<3, 3>(row, 0);
+      for (int axis = 0; axis < 3; ++axis) J.block<3, 3>(row, 3 * axis) += piece.gyro_B(axis) * by_rate;
+    }
+    total.add(rate, piece.accel_B, piece.dt, here);
   }
   return result;
 }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <vector>
 
 #include "ear/calibration.h"
@@ -35,14 +36,29 @@ struct PathNode {
   Eigen::Matrix3d J_p_ba = Eigen::Matrix3d::Zero();
 };
 
+/// E of the gyroscope, column by column: rate = (I + E) measured.
+using GyroErrors = std::array<double, 9>;
+[[nodiscard]] Eigen::Matrix3d gyro_matrix(const GyroErrors& errors);
+
+/// The pieces with the rates that `matrix` times what the gyroscope measured are.
+[[nodiscard]] std::vector<InertialPiece> corrected(std::vector<InertialPiece> pieces, const Eigen::Matrix3d& matrix);
+
 /// Nodes at the ends of all pieces, from a state at the keyframe.
 [[nodiscard]] std::vector<PathNode> path_along(const std::vector<InertialPiece>& pieces, const NavState& from);
 
 /// Between the nodes, and a little beyond them.
 [[nodiscard]] PathNode at(const std::vector<PathNode>& path, TimeNs t_ns);
 
-/// The pieces pre-integrated with a state's biases. Strikes, where the force jumps, count with more noise.
-[[nodiscard]] smoother::ImuPreintegration preintegrated(const std::vector<InertialPiece>& pieces, const NavState& from,
-                                                        const ImuCalibration& noise);
+/// Pieces pre-integrated, and what the gyroscope's errors do to that.
+struct Preintegrated {
+  smoother::ImuPreintegration motion;
+  GyroErrors at{};                     ///< the errors that it is taken with
+  Eigen::Matrix<double, 9, 9> J_gyro;  ///< of (xi, dv, dp) by the errors
+};
+
+/// The pieces, as measured, with a state's biases and the gyroscope's errors. Strikes, where the force jumps, count
+/// with more noise.
+[[nodiscard]] Preintegrated preintegrated(const std::vector<InertialPiece>& pieces, const NavState& from,
+                                          const GyroErrors& errors, const ImuCalibration& noise);
 
 }  // namespace ear::calibration

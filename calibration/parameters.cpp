@@ -1,12 +1,15 @@
 #include "calibration/parameters.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <string>
 
 #include "filter/ekf/so3.h"
 #include "filter/ekf/state.h"
 
 #include "calibration/degree.h"
+#include "calibration/inertial_path.h"
 
 namespace ear::calibration {
 namespace {
@@ -60,6 +63,7 @@ class BlockMaker {
 constexpr double kToDegrees = 1.0 / kDegree;
 constexpr double kToMillimetres = 1e3;
 constexpr double kToMilliseconds = 1e3;
+constexpr double kToPercent = 1e2;
 
 void add_cameras(Parameters& parameters, const Calibration& given, const Priors& priors,
                  std::vector<CalibrationBlock>& blocks) {
@@ -87,6 +91,18 @@ void add_cameras(Parameters& parameters, const Calibration& given, const Priors&
   blocks.push_back(BlockMaker(parameters.camera_time.data(), "cam0")
                        .add("time offset", "ms", kToMilliseconds, priors.camera_time, 1e3 * given.camera_time_offset)
                        .block());
+}
+
+void add_gyroscope(Parameters& parameters, const Priors& priors, std::vector<CalibrationBlock>& blocks) {
+  constexpr std::array kAxes{"x", "y", "z"};
+  BlockMaker maker(parameters.gyro.data(), "imu0");
+  for (const std::string measured : kAxes) {
+    for (const std::string about : kAxes) {
+      const std::string name = about == measured ? "scale " + about : about + " by what " + measured + " measures";
+      maker.add("gyroscope, " + name, "%", kToPercent, priors.gyro);
+    }
+  }
+  blocks.push_back(maker.block());
 }
 
 void add_wheels(Parameters& parameters, const Calibration& given, const Priors& priors,
@@ -150,6 +166,7 @@ Priors priors_of(const Calibration& given) {
     priors.principal_point[i] = lens.intrinsics_sigma->principal_point;
   }
   priors.distortion = 2e-3;
+  priors.gyro = given.imu.gyro_scale_sigma.value_or(5e-3);
   priors.camera_time = given.camera_time_offset_sigma.value_or(0.01);
   priors.laser_time = given.lasers.value_or(LaserCalibration{}).time_offset_sigma.value_or(2e-3);
   priors.beam_origin = 0.02;
@@ -168,6 +185,7 @@ Priors priors_of(const Calibration& given) {
 
 std::vector<CalibrationBlock> blocks_of(Parameters& parameters, const Calibration& given, const Priors& priors) {
   std::vector<CalibrationBlock> blocks;
+  add_gyroscope(parameters, priors, blocks);
   add_cameras(parameters, given, priors, blocks);
   add_wheels(parameters, given, priors, blocks);
   add_beams(parameters, given, priors, blocks);
@@ -182,6 +200,7 @@ Parameters zero_parameters(const Calibration& given) {
 
 Calibration applied(const Calibration& given, const Parameters& parameters) {
   Calibration result = given;
+  result.imu.gyro_matrix = gyro_matrix(parameters.gyro) * given.imu.gyro_matrix;
   if (!given.cameras.empty()) move_pose(result.cameras[0].T_BC, parameters.camera);
   if (given.cameras.size() > 1) {
     Eigen::Isometry3d T_C0C1 = stereo_pose(given);
@@ -216,6 +235,8 @@ Calibration applied(const Calibration& given, const Parameters& parameters) {
 
 Parameters errors_of(const Calibration& given, const Calibration& truth) {
   Parameters errors = zero_parameters(given);
+  Eigen::Map<Eigen::Matrix3d>(errors.gyro.data()) =
+      truth.imu.gyro_matrix * given.imu.gyro_matrix.inverse() - Eigen::Matrix3d::Identity();
   if (!given.cameras.empty()) errors.camera = pose_error(given.cameras[0].T_BC, truth.cameras[0].T_BC);
   if (given.cameras.size() > 1) errors.stereo = pose_error(stereo_pose(given), stereo_pose(truth));
   for (std::size_t i = 0; i < given.cameras.size(); ++i) {
@@ -257,6 +278,7 @@ Calibration with_priors(const Calibration& given, const Priors& priors) {
   if (!result.cameras.empty()) {
     result.cameras[0].pose_sigma = PoseSigma{priors.camera_rotation, priors.camera_position};
     result.camera_time_offset_sigma = priors.camera_time;
+    result.imu.gyro_scale_sigma = priors.gyro;
   }
   if (result.cameras.size() > 1) {
     result.cameras[1].pose_sigma = PoseSigma{priors.stereo_rotation, priors.stereo_position};

@@ -18,7 +18,9 @@ struct Parameters {
   /// Of each camera: focal length (relative), principal point [px], k1, k2.
   std::array<std::array<double, 5>, 2> lens{};
   std::array<double, 1> camera_time{};  ///< [s] added to the stamps
-  std::array<double, 3> wheels{};       ///< mean radius, left less right radius, track width; relative
+  /// Of the gyroscope: E, column by column; rate = (I + E) measured.
+  std::array<double, 9> gyro{};
+  std::array<double, 3> wheels{};  ///< mean radius, left less right radius, track width; relative
   /// Position of O [m]; turn of O about its own x and z, tangents: y_O = (-z, 1, x) normalized.
   std::array<double, 5> axle{};
   std::array<double, 1> encoder_time{};  ///< [s] added to the stamps
@@ -31,7 +33,7 @@ struct Parameters {
 struct Priors {
   double camera_rotation, camera_position, stereo_rotation, stereo_position;
   std::array<double, 2> focal_length, principal_point;  ///< of each camera
-  double distortion, camera_time;
+  double distortion, camera_time, gyro;
   double wheel_radius, radius_difference, track_width;
   double axle_position, axle_rotation, encoder_time;
   double beam_origin, beam_direction, laser_time;

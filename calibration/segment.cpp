@@ -19,12 +19,12 @@ Keyframe make_keyframe(const GuessedState& from, const Calibration& given) {
   return keyframe;
 }
 
-void connect(Segment& segment) {
+void connect(Segment& segment, const Eigen::Matrix3d& gyro_matrix) {
   const Drive& drive = *segment.drive;
   for (std::size_t i = 0; i + 1 < segment.keyframes.size(); ++i) {
     Keyframe& keyframe = segment.keyframes[i];
     const TimeNs next_ns = segment.keyframes[i + 1].t_ns;
-    keyframe.since = pieces_between(drive.imu, keyframe.t_ns, next_ns);
+    keyframe.since = corrected(pieces_between(drive.imu, keyframe.t_ns, next_ns), gyro_matrix);
     if (keyframe.since.empty()) {
       const double at = seconds_between(segment.keyframes.front().t_ns, keyframe.t_ns);
       throw std::invalid_argument(drive.name + ": inertial samples are missing " + std::to_string(at) +
@@ -105,7 +105,7 @@ Segment make_segment(const Drive& drive, const FirstGuess& guess, const Calibrat
   Segment segment;
   segment.drive = &drive;
   for (const GuessedState& state : guess.states) segment.keyframes.push_back(make_keyframe(state, given));
-  connect(segment);
+  connect(segment, given.imu.gyro_matrix);
   if (!given.cameras.empty()) {
     std::vector<Point> points = all_points(guess, given);
     choose_points(points, choice, segment);
@@ -126,9 +126,10 @@ NavState state_of(const Keyframe& keyframe) {
   return state;
 }
 
-void renew_paths(Segment& segment, double gyro_noise) {
+void renew_paths(Segment& segment, const GyroErrors& errors, double gyro_noise) {
   for (Keyframe& keyframe : segment.keyframes) {
-    if (!keyframe.since.empty()) keyframe.path = path_along(keyframe.since, state_of(keyframe));
+    if (!keyframe.since.empty())
+      keyframe.path = path_along(corrected(keyframe.since, gyro_matrix(errors)), state_of(keyframe));
   }
   for (std::size_t i = 0; i < segment.keyframes.size(); ++i) {
     Keyframe& keyframe = segment.keyframes[i];

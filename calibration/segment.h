@@ -66,8 +66,9 @@ struct PointChoice {
 /// The state of a keyframe's blocks.
 [[nodiscard]] NavState state_of(const Keyframe& keyframe);
 
-/// Paths and rates by the present blocks; `gyro_noise`: density [rad/s/sqrt(Hz)], below which a rate is none.
-void renew_paths(Segment& segment, double gyro_noise);
+/// Paths and rates by the present blocks and errors; `gyro_noise`: density [rad/s/sqrt(Hz)], below which a rate is
+/// none.
+void renew_paths(Segment& segment, const GyroErrors& errors, double gyro_noise);
 
 /// Where the points lie by the present poses. Those that cannot be found are not used.
 void place_points(Segment& segment, const CameraState& cameras);

@@ -52,6 +52,7 @@ Calibration with_sigmas(Calibration calibration, const std::vector<Finding>& fin
                                               mean_sigma(findings, name + ": principal point").value_or(0.0)};
   }
   if (!calibration.cameras.empty()) {
+    calibration.imu.gyro_scale_sigma = 1e-2 * mean_sigma(findings, "imu0: gyroscope").value_or(0.0);
     calibration.camera_time_offset_sigma = thousandth(findings, "cam0: time");
   }
   if (calibration.encoder) {

@@ -16,6 +16,7 @@ struct Wanted {
 };
 
 constexpr std::array kWanted{
+    Wanted{"gyroscope", 0.0, 0.5},
     Wanted{"wheel radius, mean", 1.5e-3, 0.0},
     Wanted{"wheel radius, left", 0.0, 0.1},
     Wanted{"wheel separation", 2e-3, 0.0},

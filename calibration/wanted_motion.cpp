@@ -17,6 +17,8 @@ constexpr const char* kSwing = "swing the body about the axle by 10 degrees whil
 constexpr const char* kEight = "drive figures of eight with bends of 1 m radius, and speed up and brake hard";
 
 constexpr std::array kWishes{
+    Wish{"gyroscope, scale z", kTurn},
+    Wish{"gyroscope", kHop},
     Wish{"wheel radius, mean", "drive 10 m and more straight on, with textured things 1 to 4 m away, and hop"},
     Wish{"wheel radius, left", "drive straight on and turn, both ways, 10 m and more"},
     Wish{"wheel separation", kTurn},

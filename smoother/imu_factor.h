@@ -16,6 +16,8 @@ class ImuFactor final : public ceres::SizedCostFunction<imu_error::size, 7, 9, 7
  public:
   explicit ImuFactor(const ImuPreintegration& measured);
   bool Evaluate(double const* const* blocks, double* residual, double** jacobians) const override;
+  /// What the residual, in the order of imu_error, is multiplied with.
+  [[nodiscard]] const Eigen::Matrix<double, imu_error::size, imu_error::size>& whitening() const { return whitening_; }
 
  private:
   ImuPreintegration measured_;

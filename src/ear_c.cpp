@@ -151,6 +151,8 @@ ear::Calibration calibration_of(const ear_calibration& from) {
                      sigma_of(from.gyro_bias_sigma),
                      sigma_of(from.accel_bias_sigma),
                      sigma_of(from.gyro_scale_sigma)};
+  const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> M(from.gyro_matrix);
+  if (!M.isZero(0.0)) calibration.imu.gyro_matrix = M;
   calibration.camera_time_offset_sigma = sigma_of(from.camera_time_offset_sigma);
   if (from.has_encoder != 0) calibration.encoder = encoder_of(from);
   if (from.beam_count > 0) calibration.lasers = lasers_of(from);

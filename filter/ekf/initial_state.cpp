@@ -91,6 +91,8 @@ const Calibration& checked(const Calibration& calibration) {
           "calibration: imu noise must be positive");
   require(calibration.imu.rate_hz > 0.0 && std::isfinite(calibration.imu.rate_hz),
           "calibration: imu rate_hz must be a positive number");
+  require((calibration.imu.gyro_matrix - Eigen::Matrix3d::Identity()).norm() < 0.5,
+          "calibration: gyro_matrix must be near the identity: axes that point elsewhere belong into T_BS");
   if (const auto& encoder = calibration.encoder) {
     require(encoder->wheel_radius[0] > 0.0 && encoder->wheel_radius[1] > 0.0,
             "calibration: wheel_radius must be positive");

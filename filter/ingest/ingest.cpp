@@ -56,7 +56,9 @@ ImuVerdict Ingest::judge(const ImuSample& sample, bool has_state) {
 ImuFault Ingest::store(const ImuSample& sample, const ImuVerdict& verdict) {
   const double dt = imu_.empty() ? INFINITY : seconds_between(imu_.newest().t_ns, sample.t_ns);
   const SampleSigma sigma(calibration_.imu, verdict.interval);
-  imu_.push(sample, impact_guard_.add(sample, sigma));
+  ImuSample corrected = sample;
+  corrected.gyro_B = calibration_.imu.gyro_matrix * sample.gyro_B;
+  imu_.push(corrected, impact_guard_.add(sample, sigma));
   spikes_.set_sigma(sigma);
   ImuFault spike;
   if (imu_.size() == 1) {

@@ -55,6 +55,8 @@ struct ImuCalibration {
   std::optional<double> gyro_bias_sigma;   ///< [rad/s] of the bias at the start, about zero
   std::optional<double> accel_bias_sigma;  ///< [m/s^2]
   std::optional<double> gyro_scale_sigma;  ///< relative; also of one axis in turns about another
+  /// M, where the axes are not perpendicular or of a wrong scale: rate = M measured. The filter learns what is left.
+  Eigen::Matrix3d gyro_matrix = Eigen::Matrix3d::Identity();
 };
 
 /// Two wheels on one axle. O is the middle of the axle: x forward, y left along the axle, z up.

@@ -1,3 +1,4 @@
+#include "calibration/inertial_factor.h"
 #include "calibration/inertial_path.h"
 #include "calibration/models.h"
 #include "calibration/pixel_factor.h"
@@ -116,6 +117,43 @@ TEST_CASE("calibration: derivatives of a beam, the ground's change, the origin a
     smoother::test::check_factor(BiasFactor(BiasModel{}), {small(rng, 9, 0.1)});
     smoother::test::check_factor(ReferenceFactor(ReferenceModel{random_vector(rng, 1.0), beam.onwards, 0.5}),
                                  {block(T_WB), small(rng, 9, 0.3), small(rng, 4, 0.3)});
+  }
+}
+
+TEST_CASE("calibration: derivatives of the inertial samples, by the gyroscope's errors too") {
+  namespace imu_error = smoother::imu_error;
+  std::mt19937_64 rng{13};
+  for (int trial = 0; trial < 5; ++trial) {
+    std::vector<InertialPiece> pieces;
+    for (int k = 0; k < 40; ++k) {
+      pieces.push_back({0, 0.005, random_vector(rng, 1.0), random_vector(rng, 5.0) + Eigen::Vector3d(0, 0, 9.81), 0.0});
+    }
+    NavState from;
+    from.b_g = random_vector(rng, 0.05);
+    from.b_a = random_vector(rng, 0.3);
+    const auto with = [&](const Eigen::VectorXd& errors) {
+      GyroErrors values{};
+      std::copy(errors.begin(), errors.end(), values.begin());
+      return preintegrated(pieces, from, values, ImuCalibration{});
+    };
+    const Eigen::VectorXd errors = small(rng, 9, 0.01);
+    const Preintegrated measured = with(errors);
+    // Of what was turned and gained, against taking the samples anew with other errors: R = Exp(xi) R^.
+    ear::test::check_jacobian(
+        [&](const Eigen::VectorXd& step) {
+          const smoother::ImuPreintegration moved = with(errors + step).motion;
+          Eigen::VectorXd change(9);
+          change.segment<3>(imu_error::xi) = log_so3(moved.R_BiBj() * measured.motion.R_BiBj().transpose());
+          change.segment<3>(imu_error::dv) = moved.dv_Bi();
+          change.segment<3>(imu_error::dp) = moved.dp_Bi();
+          return change;
+        },
+        measured.J_gyro, 1e-5);
+    const Pose T_i = random_pose(rng, 0.5, 5.0);
+    const Pose T_j{T_i.R * measured.motion.R_BiBj(), T_i.p + random_vector(rng, 0.1)};
+    Eigen::VectorXd a = small(rng, 9, 0.5), b = small(rng, 9, 0.5);
+    a.segment<3>(smoother::motion_entry::b_g) = b.segment<3>(smoother::motion_entry::b_g) = from.b_g;
+    smoother::test::check_factor(InertialFactor(measured), {block(T_i), a, block(T_j), b, errors}, 1e-4);
   }
 }
 

@@ -21,6 +21,8 @@ TEST_CASE("calibration: parameters of a wrong calibration lead to the true one")
   const Calibration made = applied(given, errors_of(given, truth));
   CHECK(made.encoder->time_offset == doctest::Approx(-0.02));
   CHECK(made.lasers->time_offset == doctest::Approx(0.03));
+  CHECK_FALSE(truth.imu.gyro_matrix.isApprox(given.imu.gyro_matrix, 1e-3));
+  CHECK(made.imu.gyro_matrix.isApprox(truth.imu.gyro_matrix, 1e-12));
   for (std::size_t i = 0; i < 2; ++i) {
     CHECK(made.cameras[i].T_BC.isApprox(truth.cameras[i].T_BC, 1e-9));
     CHECK(made.cameras[i].fu == doctest::Approx(truth.cameras[i].fu));
@@ -49,7 +51,10 @@ TEST_CASE("calibration: what sensor.yaml states is the prior; a sketch where it 
   given.cameras.resize(2);
   for (CameraCalibration& camera : given.cameras) camera.fu = camera.fv = 400.0;
   given.cameras[1].intrinsics_sigma = IntrinsicsSigma{0.8, 0.3};
+  CHECK(priors_of(given).gyro == 5e-3);
+  given.imu.gyro_scale_sigma = 2e-3;
   const Priors priors = priors_of(given);
+  CHECK(priors.gyro == 2e-3);
   CHECK(priors.focal_length[0] == 5e-3);
   CHECK(priors.focal_length[1] / 2e-3 == doctest::Approx(1.0));
   CHECK(priors.principal_point[1] == 0.3);

@@ -34,8 +34,9 @@ double acceleration(double t) { return t < 2.0 ? 0.0 : 0.8 * std::exp(-(t - 2.0)
 double yaw_rate(double t) { return t < 3.0 ? 0.0 : 0.25 + 0.35 * std::sin(0.3 * (t - 3.0)); }
 
 /// At the end, with a gyroscope that measures (1 + `scale`) times the rate.
-Estimate drive(double scale, const FilterConfig& config) {
-  const Calibration calibration = two_wheels();
+Estimate drive(double scale, const FilterConfig& config, const Eigen::Matrix3d& told = Eigen::Matrix3d::Identity()) {
+  Calibration calibration = two_wheels();
+  calibration.imu.gyro_matrix = told;
   Filter filter(config, calibration);
   std::optional<Estimate> last;
   double left = 0.0, right = 0.0;  // [m] rolled
@@ -131,6 +132,15 @@ TEST_CASE("gyroscope's scale: its share of the covariance is what it does to att
   CHECK(near(at::position, by_position));
   const Eigen::Matrix3d cross = sigma * sigma * by_position * by_yaw.transpose();
   CHECK((share.block<3, 3>(at::position, at::rotation) - cross).norm() < 0.05 * cross.norm());
+}
+
+TEST_CASE("gyroscope's scale: a matrix that is given undoes it") {
+  const FilterConfig config;
+  const Estimate exact = drive(0.0, config);
+  const Estimate told = drive(0.02, config, Eigen::Vector3d(1.0, 1.0, 1.0 / 1.02).asDiagonal().toDenseMatrix());
+  const Estimate not_told = drive(0.02, config);
+  CHECK((told.state.p_WB - exact.state.p_WB).norm() < 1e-6);
+  CHECK((not_told.state.p_WB - exact.state.p_WB).norm() > 0.1);
 }
 
 TEST_CASE("gyroscope's scale: on a ramp the wheels are believed, not the tilt that it makes") {

@@ -124,6 +124,8 @@ TEST_CASE("initial state: standard deviations, rates and offsets that cannot be 
   CHECK(names(reason([](C& c) { c.lasers->offset_sigma = 0.0; }), "offset_sigma"));
   CHECK(names(reason([](C& c) { c.encoder->time_offset_sigma = 0.0; }), "the encoder's time_offset_sigma"));
   CHECK(names(reason([](C& c) { c.lasers->time_offset_sigma = -1.0; }), "the lasers' time_offset_sigma"));
+  CHECK(names(reason([](C& c) { c.imu.gyro_matrix(0, 1) = std::nan(""); }), "gyro_matrix"));
+  CHECK(names(reason([](C& c) { c.imu.gyro_matrix *= -1.0; }), "gyro_matrix"));
   for (const double rate_hz : {0.0, -200.0, std::nan(""), std::numeric_limits<double>::infinity()}) {
     CHECK(names(reason([&](C& c) { c.imu.rate_hz = rate_hz; }), "imu rate_hz must be a positive number"));
   }

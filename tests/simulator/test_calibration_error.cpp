@@ -95,6 +95,7 @@ Draws differences(double factor) {
     Rng rng = make_rng(seed, Stream::imu);
     const ImuBias bias = draw_imu_biases(truth.imu, 1, rng).front();
     add(draws["accelerometer bias [m/s^2]"], bias.accel + errors.accel_bias);
+    add(draws["gyroscope's matrix [%]"], 1e2 * errors.gyro_matrix.reshaped());
   }
   return draws;
 }
@@ -118,7 +119,6 @@ void check_same_drive(const Simulation& a, const Simulation& b) {
   REQUIRE(a.imu().size() == b.imu().size());
   for (std::size_t i = 0; i < a.imu().size(); ++i) {
     CHECK(a.imu()[i].t_ns == b.imu()[i].t_ns);
-    CHECK(a.imu()[i].gyro_B == b.imu()[i].gyro_B);
     const Truth truth = a.truth(a.imu()[i].t_ns);
     const Truth other = b.truth(b.imu()[i].t_ns);
     CHECK(truth.p_WB == other.p_WB);
@@ -176,6 +176,7 @@ TEST_CASE("calibration error: every quantity is drawn with its standard deviatio
       {"encoders' time [ms]", 2.0},
       {"lasers' time [ms]", 2.0},
       {"accelerometer bias [m/s^2]", 0.08},
+      {"gyroscope's matrix [%]", 0.3},
   };
   for (const double factor : {1.0, 3.0}) {
     CAPTURE(factor);
@@ -220,21 +221,37 @@ TEST_CASE("calibration error: 0 is the true calibration, bit for bit; the drive 
   check_same_drive(perfect, fixed);
   for (std::size_t i = 0; i < perfect.imu().size(); ++i) {
     CHECK(perfect.imu()[i].accel_B == fixed.imu()[i].accel_B);
+    CHECK(perfect.imu()[i].gyro_B == fixed.imu()[i].gyro_B);
   }
 }
 
-TEST_CASE("calibration error: motion, noise and what is true stay, but for the accelerometer's bias") {
+TEST_CASE(
+    "calibration error: motion, noise and what is true stay, but for the accelerometer's bias and the gyroscope") {
   const Simulation perfect(short_run(0.0));
   const Simulation wrong(short_run(1.0));
   check_same_drive(perfect, wrong);
   CHECK(perfect.true_calibration().cameras[1].T_BC.matrix() == wrong.true_calibration().cameras[1].T_BC.matrix());
   const CalibrationErrors errors = draw_calibration_errors(18, 1.0);
   CHECK(errors.accel_bias.norm() > 0.01);
+  CHECK(errors.gyro_matrix.norm() > 0.001);
+  const Eigen::Matrix3d M = Eigen::Matrix3d::Identity() + errors.gyro_matrix;
+  CHECK(wrong.true_calibration().imu.gyro_matrix == M);
+  CHECK(wrong.calibration().imu.gyro_matrix.isIdentity(0.0));
+  CHECK(perfect.true_calibration().imu.gyro_matrix.isIdentity(0.0));
+  Options ideal = short_run(0.0);
+  ideal.sensor_noise = false;
+  const Simulation exact(ideal);
+  double fastest = 0.0;  // [rad/s]
   for (std::size_t i = 0; i < perfect.imu().size(); ++i) {
     const TimeNs t_ns = perfect.imu()[i].t_ns;
     CHECK((wrong.imu()[i].accel_B - perfect.imu()[i].accel_B - errors.accel_bias).norm() < 1e-12);
+    const Eigen::Vector3d rate_B = exact.imu()[i].gyro_B;
+    const Eigen::Vector3d bias_and_noise = perfect.imu()[i].gyro_B - rate_B;
+    CHECK((M * (wrong.imu()[i].gyro_B - bias_and_noise) - rate_B).norm() < 1e-12);
+    fastest = std::max(fastest, rate_B.norm());
     CHECK((wrong.truth(t_ns).b_a - perfect.truth(t_ns).b_a - errors.accel_bias).norm() < 1e-12);
   }
+  CHECK(fastest > 0.1);
   const ear::Calibration expected = with_errors(wrong.true_calibration(), errors);
   CHECK(wrong.calibration().cameras[1].T_BC.matrix() == expected.cameras[1].T_BC.matrix());
   CHECK(wrong.calibration().encoder->wheel_radius == expected.encoder->wheel_radius);
@@ -254,6 +271,7 @@ TEST_CASE("calibration error: another factor scales the same draws; an IMU witho
   options.tracks = false;
   const Simulation ideal(options);
   CHECK(ideal.truth(ideal.imu()[100].t_ns).b_a == Eigen::Vector3d::Zero());
+  CHECK(ideal.true_calibration().imu.gyro_matrix.isIdentity(0.0));
   CHECK(ideal.calibration().camera_time_offset != 0.0);
 }
 

@@ -13,6 +13,7 @@ Priors drawn_priors(double factor) {
   priors.principal_point.fill(factor * 0.5);
   priors.distortion = 1e-3;
   priors.camera_time = factor * 2e-3;
+  priors.gyro = factor * 3e-3;
   priors.wheel_radius = factor * 4e-3;
   priors.radius_difference = factor * 1e-3;
   priors.track_width = factor * 5e-3;

@@ -26,6 +26,7 @@ constexpr double kBeamRotation = 0.3 * kDegree;
 constexpr double kBeamOrigin = 2e-3;  // [m]
 constexpr double kTimeOffset = 2e-3;  // [s]
 constexpr double kAccelBias = 0.08;   // [m/s^2] with that of every IMU
+constexpr double kGyroMatrix = 3e-3;  // each entry
 
 // Sizes of with_fixed_errors().
 constexpr double kFixedMounting = 0.2 * kDegree;
@@ -80,6 +81,7 @@ CalibrationErrors draw_calibration_errors(std::uint64_t seed, double factor) {
   errors.accel_bias = normal3(rng, factor * more_bias);
   errors.encoder_time_offset = normal(rng, factor * kTimeOffset);
   errors.laser_time_offset = normal(rng, factor * kTimeOffset);
+  for (double& entry : errors.gyro_matrix.reshaped()) entry = normal(rng, factor * kGyroMatrix);
   return errors;
 }
 
@@ -115,6 +117,7 @@ Calibration with_errors(Calibration given, const CalibrationErrors& errors) {
   given.camera_time_offset += errors.camera_time_offset;
   encoder.time_offset += errors.encoder_time_offset;
   given.lasers->time_offset += errors.laser_time_offset;
+  given.imu.gyro_matrix.setIdentity();
   return given;
 }
 

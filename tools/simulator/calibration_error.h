@@ -37,17 +37,19 @@ struct CalibrationErrors {
   double laser_time_offset = 0.0;    ///< [s]
   /// What the accelerometer's true bias is larger by [m/s^2]: a rig with such errors has one that nobody removed.
   Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();
+  /// Of the gyroscope's matrix, which nobody measured: scales, and what an axis measures of turns about another.
+  Eigen::Matrix3d gyro_matrix = Eigen::Matrix3d::Zero();
 };
 
 /// Independent normal draws, of a random stream that nothing else uses. One sigma at factor 1: cameras to body 0.2
 /// degrees and 1 mm, right camera against left 0.02 degrees and 0.05 mm, focal lengths 0.1 %, principal points 0.5 px,
 /// wheel radius 0.4 % in common and 0.1 % between left and right, track width 0.5 %, odometer to body 0.3 degrees and
 /// 3 mm, beams 0.3 degrees and 2 mm, times of cameras, encoders and lasers 2 ms each. The accelerometer's bias at the
-/// start is then one of 0.08 m/s^2 per axis in all, 0.03 of it from draw_imu_biases(). Another factor scales all of
-/// them; 0 is no error.
+/// start is then one of 0.08 m/s^2 per axis in all, 0.03 of it from draw_imu_biases(), and each entry of the
+/// gyroscope's matrix is off by 0.3 %. Another factor scales all of them; 0 is no error.
 [[nodiscard]] CalibrationErrors draw_calibration_errors(std::uint64_t seed, double factor);
 
-/// The true calibration with these errors in it.
+/// The true calibration with these errors in it, and an exact gyroscope.
 [[nodiscard]] Calibration with_errors(Calibration truth, const CalibrationErrors& errors);
 
 /// Errors of fixed sizes, of which `rng` draws signs and axes: wheel radius 0.3 % (left against right 0.03 %), track

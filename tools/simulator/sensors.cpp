@@ -62,7 +62,9 @@ std::vector<ImuSample> ideal_imu(const Trajectory& trajectory, const std::vector
 void corrupt_imu(std::vector<ImuSample>& samples, const ImuCalibration& imu, const std::vector<ImuBias>& biases,
                  Rng& rng) {
   const double root_rate = std::sqrt(imu.rate_hz);
+  const Eigen::Matrix3d measured = imu.gyro_matrix.inverse();
   for (std::size_t i = 0; i < samples.size(); ++i) {
+    samples[i].gyro_B = (measured * samples[i].gyro_B).eval();
     samples[i].gyro_B += biases[i].gyro + normal3(rng, imu.gyro_noise * root_rate);
     samples[i].accel_B += biases[i].accel + normal3(rng, imu.accel_noise * root_rate);
   }

@@ -38,7 +38,7 @@ inline constexpr double kInitialAccelBias = 0.03;
 [[nodiscard]] std::vector<ImuSample> ideal_imu(const Trajectory& trajectory, const std::vector<TimeNs>& stamps,
                                                double rate_hz);
 
-/// Adds biases and white noise.
+/// By axes of the gyroscope that are off, with biases and white noise.
 void corrupt_imu(std::vector<ImuSample>& samples, const ImuCalibration& imu, const std::vector<ImuBias>& biases,
                  Rng& rng);
 

@@ -126,6 +126,9 @@ std::vector<ImuBias> drawn_biases(const Options& options, const ImuCalibration& 
 Calibration vehicle_of(const Options& options) {
   Calibration vehicle = make_vehicle(options.camera_rate_hz, options.lens);
   for (CameraCalibration& camera : vehicle.cameras) camera.distortion[4] = options.k3;
+  if (options.sensor_noise && options.calibration_error) {
+    vehicle.imu.gyro_matrix += draw_calibration_errors(options.seed, *options.calibration_error).gyro_matrix;
+  }
   return vehicle;
 }
 
