@@ -421,8 +421,8 @@ void require_views(std::size_t count) {
 
 /// The standard deviations in the places where the filter looks for them; the left camera's pose in the body is not
 /// shown by a board.
-Calibration stated(const Calibration& found, const Calibration& start, const std::vector<Finding>& findings) {
-  Calibration result = with_sigmas(found, findings);
+Calibration stated(const Calibration& found, const Calibration& start, const BoardResult& shown) {
+  Calibration result = with_sigmas(found, shown.findings, shown.covariance);
   result.cameras[0].pose_sigma = start.cameras[0].pose_sigma;
   result.camera_time_offset_sigma = start.camera_time_offset_sigma;
   return result;
@@ -460,7 +460,7 @@ BoardResult calibrate_cameras(const Calibration& start, const BoardShape& board,
     for (const std::string& line : result.advice) words += "\n  " + line;
     throw std::invalid_argument(words);
   }
-  result.calibration = stated(problem.calibration(), start, result.findings);
+  result.calibration = stated(problem.calibration(), start, result);
   return result;
 }
 

@@ -121,7 +121,7 @@ Result calibrate(const Calibration& given, const Priors& priors, const std::vect
   result.parameters = batch.parameters();
   result.noise = batch.noise();
   result.left_out = passed.left_out;
-  result.calibration = with_sigmas(applied(given, batch.parameters()), result.findings);
+  result.calibration = with_sigmas(applied(given, batch.parameters()), result.findings, result.covariance);
   return result;
 }
 

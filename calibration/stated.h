@@ -1,6 +1,7 @@
 // A calibration with what is known of its values, as sensor.yaml states it.
 #pragma once
 
+#include <Eigen/Core>
 #include <optional>
 #include <string>
 #include <vector>
@@ -9,8 +10,11 @@
 
 namespace ear::calibration {
 
-/// `calibration` with the standard deviations of the findings, in the places where the filter looks for them.
-[[nodiscard]] Calibration with_sigmas(Calibration calibration, const std::vector<Finding>& findings);
+/// `calibration` with the standard deviations of the findings, in the places where the filter looks for them. It takes
+/// them for independent. What is turned against the accelerometer together, cameras, gyroscope and axle, is not: these
+/// are stated so much larger that the filter takes nothing for better known than `covariance`, of the findings, says.
+[[nodiscard]] Calibration with_sigmas(Calibration calibration, const std::vector<Finding>& findings,
+                                      const Eigen::MatrixXd& covariance);
 
 /// Root mean square of the standard deviations of all entries whose name begins so, in their unit. Nothing where there
 /// is none.

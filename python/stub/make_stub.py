@@ -49,7 +49,7 @@ FIELDS = {
     "time_offset_sigma": "float | None",
     "encoder": "EncoderCalibration | None", "InputCounts.encoder": "StreamCounts", "lasers": "LaserCalibration | None",
     "cameras": "tuple[CameraCalibration, ...]", "beams": "tuple[LaserBeam, ...]", "T_BC": ARRAY, "T_BO": ARRAY,
-    "p_BL": ARRAY, "d_B": ARRAY, "q_WB": ARRAY, "p_WB": ARRAY, "v_W": ARRAY, "b_g": ARRAY, "b_a": ARRAY, "covariance": ARRAY,
+    "gyro_matrix": ARRAY, "p_BL": ARRAY, "d_B": ARRAY, "q_WB": ARRAY, "p_WB": ARRAY, "v_W": ARRAY, "b_g": ARRAY, "b_a": ARRAY, "covariance": ARRAY,
     "distortion": "tuple[float, float, float, float, float]", "wheel_radius": "tuple[float, float]",
     "PriorConfig.wheel_radius": "float",
     "available": "tuple[bool, bool, bool]", "coefficient": "tuple[float, float, float]",

@@ -1,6 +1,9 @@
 #include "calibration/parameters.h"
 
+#include <Eigen/Eigenvalues>
+
 #include "calibration/findings.h"
+#include "calibration/stated.h"
 #include "tests/smoother/support.h"
 #include "tools/calibration/simulated_drive.h"
 
@@ -89,4 +92,43 @@ TEST_CASE("calibration: what hangs on a value that was not shown moves with it, 
   CHECK(decided.covariance(0, 1) == doctest::Approx(0.5));
   CHECK(values[2] == doctest::Approx(0.1));
   CHECK(decided.findings[2].posterior == doctest::Approx(0.2));
+}
+
+TEST_CASE("calibration: what is turned together is stated so that, taken for independent, it is nowhere better known") {
+  Calibration found;
+  found.cameras.resize(1);
+  found.encoder = EncoderCalibration{};
+  Parameters parameters = zero_parameters(found);
+  const double sigma = 1e-3;  // of each, [rad] or relative
+  std::vector<Finding> findings;
+  for (const CalibrationBlock& block : blocks_of(parameters, found, priors_of(found))) {
+    for (const Entry& entry : block.entries) {
+      findings.push_back({entry.name, entry.unit, 0.0, 0.0, 1.0, entry.scale * sigma, true, "", 0.0, ""});
+    }
+  }
+  // Gyroscope, camera and axle about x share nearly all of their error.
+  const auto n = static_cast<Eigen::Index>(findings.size());
+  Eigen::MatrixXd P = sigma * sigma * Eigen::MatrixXd::Identity(n, n);
+  std::vector<Eigen::Index> shared;
+  for (const char* name : {"imu0: gyroscope, y by what z measures", "cam0: rotation in the body about x",
+                           "encoder0: axle turned about x"}) {
+    const auto at = std::find_if(findings.begin(), findings.end(), [&](const Finding& f) { return f.name == name; });
+    REQUIRE(at != findings.end());
+    shared.push_back(at - findings.begin());
+  }
+  for (const Eigen::Index i : shared) {
+    for (const Eigen::Index j : shared) P(i, j) = (i == j ? 1.0 : 0.99) * sigma * sigma;
+  }
+  const Calibration stated = with_sigmas(found, findings, P);
+  const double factor = std::sqrt(1.0 + 2.0 * 0.99);
+  CHECK(stated.cameras[0].pose_sigma->rotation == doctest::Approx(factor * sigma));
+  CHECK(stated.imu.gyro_scale_sigma.value_or(0.0) == doctest::Approx(factor * sigma));
+  CHECK(stated.encoder->T_BO_sigma->rotation == doctest::Approx(factor * sigma));
+  CHECK(stated.cameras[0].pose_sigma->position == doctest::Approx(sigma));
+
+  const Eigen::MatrixXd independent = std::pow(factor * sigma, 2) * Eigen::MatrixXd::Identity(3, 3);
+  const Eigen::MatrixXd beyond = independent - P(shared, shared);
+  CHECK(Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(beyond).eigenvalues().minCoeff() > -1e-6 * sigma * sigma);
+  CHECK(with_sigmas(found, findings, sigma * sigma * Eigen::MatrixXd::Identity(n, n)).cameras[0].pose_sigma->rotation ==
+        doctest::Approx(sigma));
 }

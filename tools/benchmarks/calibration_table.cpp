@@ -81,7 +81,7 @@ std::vector<OtherDrive> drive_on(const Arguments& args, const simulator::Options
     const Calibration given = calibration::with_priors(simulation.calibration(), priors);
     const auto measured = [&](const std::string& told, const Calibration& calibration) {
       Calibration same_biases = calibration;
-      same_biases.imu = result.calibration.imu;  // the biases are as large whatever the calibration
+      same_biases.imu.accel_bias_sigma = result.calibration.imu.accel_bias_sigma;  // as large whatever the calibration
       const Figures run = measure(simulation, same_biases, FilterConfig{}, evaluation::AlignmentKind::yaw);
       figures.push_back({sequence, told, run.ate_rmse.value_or(NAN), run.nees_position.value_or(NAN)});
     };
