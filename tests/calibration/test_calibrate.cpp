@@ -111,6 +111,8 @@ TEST_CASE("calibrate: standing shows no wheel, no direction and no clock; each r
                {"position of the axle x", "turn on the spot"},
                {"axle turned about x", "turn on the spot"},
                {"axle turned about z", "straight on"},
+               {"gyroscope, scale x", "hover"},
+               {"gyroscope, scale z", "turn on the spot"},
                {"cam0: rotation", "figures of eight"},
                {"cam0: position", "turn on the spot"},
                {"cam0: time", "figures of eight"},
@@ -124,6 +126,7 @@ TEST_CASE("calibrate: a straight drive shows the difference of the radii, and no
   check_poor({"straight",
               std::nullopt,
               {{"wheel separation", "turn on the spot"},
+               {"gyroscope, scale z", "turn on the spot"},
                {"position of the axle y", "turn on the spot"},
                {"cam0: position in the body y", "turn on the spot"},
                {"tilt", "hover"},
@@ -143,7 +146,8 @@ TEST_CASE("calibrate: on a flat floor wheels show, and the beams' directions do 
   check_poor({"flat1",
               35.0,
               {{"tilt", "hover"}, {"origin y", "hover"}},
-              {"wheel radius", "wheel separation", "position of the axle x", "axle turned", "cam0: rotation"}});
+              {"wheel radius", "wheel separation", "gyroscope, scale z", "position of the axle x", "axle turned",
+               "cam0: rotation"}});
 }
 
 TEST_CASE("calibrate: errors that last as long as a track are told from the residuals, and make features count less") {

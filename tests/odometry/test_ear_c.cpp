@@ -56,6 +56,7 @@ ear_calibration to_c(const Calibration& from) {
   to.gyro_random_walk = from.imu.gyro_random_walk;
   to.accel_noise = from.imu.accel_noise;
   to.accel_random_walk = from.imu.accel_random_walk;
+  Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>{to.gyro_matrix} = from.imu.gyro_matrix;
   if (from.encoder) {
     to.has_encoder = 1;
     to_rows(from.encoder->T_BO, to.T_BO);
@@ -96,6 +97,12 @@ struct Drive : simulator::Film {
     return options;
   }
 
+  /// With a gyroscope's matrix, so that each of its entries counts.
+  [[nodiscard]] Calibration calibration() const {
+    Calibration given = simulation.calibration();
+    given.imu.gyro_matrix += 1e-3 * Eigen::Vector3d(1.0, -2.0, 0.5) * Eigen::RowVector3d(0.4, 1.0, -0.7);
+    return given;
+  }
   [[nodiscard]] ear_stereo_frame c_frame(std::size_t i) const {
     return {simulation.frame_times()[i], pictures[i][0].data, pictures[i][1].data,
             static_cast<std::ptrdiff_t>(pictures[i][0].step)};
@@ -144,7 +151,7 @@ struct Drive : simulator::Film {
   /// What class Odometry makes of the same, sample by sample as they arrive.
   [[nodiscard]] std::vector<Estimate> direct() const {
     std::vector<Estimate> result;
-    Odometry odometry(Config{}, simulation.calibration());
+    Odometry odometry(Config{}, calibration());
     for (const simulator::Delivery& delivery : simulation.deliveries()) {
       if (delivery.stream == SensorStream::imu) odometry.add_imu(simulation.imu()[delivery.index]);
       if (delivery.stream == SensorStream::encoder) odometry.add_encoder(simulation.encoders()[delivery.index]);
@@ -162,7 +169,7 @@ const Drive& drive() {
 }
 
 Handle make(const ear_settings* settings = nullptr) {
-  const ear_calibration calibration = to_c(drive().simulation.calibration());
+  const ear_calibration calibration = to_c(drive().calibration());
   std::array<char, 200> message{};
   ear_odometry* odometry = nullptr;
   const ear_result result = ear_create(&calibration, settings, &odometry, message.data(), message.size());
