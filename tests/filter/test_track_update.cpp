@@ -43,7 +43,8 @@ struct Passage {
     sigmas.segment<3>(err::rho).setConstant(sigma.position);
     ekf.start(x, sigmas);
     ImuBuffer imu(512);
-    for (TimeNs t_ns = kStart; t_ns <= kStart + 6 * kFrame; t_ns += kPeriod) imu.push({t_ns, {}, {0.0, 0.0, 9.80665}});
+    for (TimeNs t_ns = kStart; t_ns <= kStart + 6 * kFrame; t_ns += kPeriod)
+      imu.push({t_ns, Eigen::Vector3d::Zero(), {0.0, 0.0, 9.80665}});
     for (int i = 0; i < 6; ++i) {
       ekf.propagate(imu, kStart + i * kFrame, ImuNoiseFactors{1e-3, 1e-3}, 0.0);
       ekf.clone(1.0);
