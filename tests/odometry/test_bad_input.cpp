@@ -178,7 +178,7 @@ TEST_CASE("bad input: one camera sees nothing in a right image") {
     frame.features.resize(2);
     frame.features[0].id = 1;
     frame.features[1].has_right = true;
-    filter.add_imu({frame.t_ns, {}, {0.0, 0.0, 9.81}});
+    filter.add_imu({frame.t_ns, Eigen::Vector3d::Zero(), {0.0, 0.0, 9.81}});
     (void)filter.process(frame);
     return filter.input_counts().features_rejected;
   };
