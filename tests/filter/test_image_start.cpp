@@ -12,6 +12,7 @@
 #include "filter/ekf/so3.h"
 #include "filter/start/start_moments.h"
 #include "tests/support/about.h"
+#include "tests/support/workload.h"
 #include "tools/simulator/simulation.h"
 
 using namespace ear;
@@ -219,7 +220,8 @@ TEST_CASE("image start: velocity, tilt and bias in flight, by a calibration as w
   }
 }
 
-TEST_CASE("image start: how noisy the inertial samples are, against what is stated") {
+TEST_CASE("image start: how noisy the inertial samples are, against what is stated" *
+          doctest::skip(test::kStatistics)) {
   struct Case {
     ImuNoiseFactors times;
     bool stereo;
