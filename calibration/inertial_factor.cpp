@@ -1,7 +1,5 @@
 #include "calibration/inertial_factor.h"
 
-#include <Eigen/Cholesky>
-
 #include "smoother/factor.h"
 
 namespace ear::calibration {

@@ -94,9 +94,8 @@ Preintegrated preintegrated(const std::vector<InertialPiece>& pieces, const NavS
   for (const InertialPiece& piece : pieces) {
     ImuCalibration here = noise;
     if (piece.jump > kStrike) here.accel_noise = std::hypot(noise.accel_noise, 0.5 * piece.jump * std::sqrt(piece.dt));
-    const Eigen::Vector3d rate = M * piece.gyro_B;
     smoother::ImuPreintegration step(from.b_g, from.b_a);
-    step.add(rate, piece.accel_B, piece.dt, here);
+    step.add(M * piece.gyro_B, piece.accel_B, piece.dt, here);
 
     // What was turned until here turns all that follows: Exp(xi) R and with it R dv, R dp of the step.
     const Eigen::Matrix3d R = total.R_BiBj();
@@ -109,7 +108,7 @@ Preintegrated preintegrated(const std::vector<InertialPiece>& pieces, const NavS
       const Eigen::Matrix3d by_rate = -R * step.J_bias().block<3, 3>(row, 0);
       for (int axis = 0; axis < 3; ++axis) J.block<3, 3>(row, 3 * axis) += piece.gyro_B(axis) * by_rate;
     }
-    total.add(rate, piece.accel_B, piece.dt, here);
+    total.append(step);
   }
   return result;
 }

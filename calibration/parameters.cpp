@@ -9,7 +9,6 @@
 #include "filter/ekf/state.h"
 
 #include "calibration/degree.h"
-#include "calibration/inertial_path.h"
 
 namespace ear::calibration {
 namespace {

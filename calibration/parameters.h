@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "calibration/inertial_path.h"
 #include "ear/calibration.h"
 
 namespace ear::calibration {
@@ -18,8 +19,7 @@ struct Parameters {
   /// Of each camera: focal length (relative), principal point [px], k1, k2.
   std::array<std::array<double, 5>, 2> lens{};
   std::array<double, 1> camera_time{};  ///< [s] added to the stamps
-  /// Of the gyroscope: E, column by column; rate = (I + E) measured.
-  std::array<double, 9> gyro{};
+  GyroErrors gyro{};
   std::array<double, 3> wheels{};  ///< mean radius, left less right radius, track width; relative
   /// Position of O [m]; turn of O about its own x and z, tangents: y_O = (-z, 1, x) normalized.
   std::array<double, 5> axle{};

@@ -1,8 +1,7 @@
 """Recordings whose calibration is as wrong as on real rigs: sensor.yaml, clocks and gyroscope, drawn at random.
 
-The standard deviations are those of `ear simulate --calibration-error 1` (docs/simulator.md); besides, each axis of the gyroscope is
-0.3 % off in its scale and in what it measures of turns about each other. What a recording lacks is left out; the errors that a real
-one has already are added to.
+The standard deviations are those of `ear simulate --calibration-error 1` (docs/simulator.md). What a recording lacks is left out;
+the errors that a real one has already are added to.
 """
 
 import math

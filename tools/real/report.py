@@ -76,8 +76,7 @@ the position is far off. "none": no estimate, with a reason in words; empty: the
 MISCALIBRATED = """## Calibration as wrong as on real rigs
 
 `tools/real_data miscalibrate`: 20 draws of errors in everything that sensor.yaml says of cameras, wheels and beams, and in their clocks, with the standard
-deviations of [`--calibration-error 1`](simulator.md), and of 0.3 % in scales and axes of the gyroscope. The calibration of
-`hop` is exact as it is; to those of the others these errors are added.
+deviations of [`--calibration-error 1`](simulator.md). The calibration of `hop` is exact as it is; to those of the others these errors are added.
 """
 
 
