@@ -79,7 +79,7 @@ void Sources::advance(TimeNs t_ns, const Advice& advice, Ingest& ingest, Ekf& ek
     } else if (on_ground() && ground_.rolls_at(z->increment->from_ns)) {
       wheels_->update(*z->increment,
                       {ingest.imu(), ground_.known(), advice.of(MotionSensor::odometer), camera_update_,
-                       imu_score_.noise().gyro, standstill_.stands()},
+                       imu_score_.noise().gyro, standstill_.stands(), standstill_.wheels_rest(z->t_ns)},
                       ekf, records);
     }
   }

@@ -10,7 +10,6 @@
 namespace ear {
 namespace {
 
-constexpr double kNoRest = 0.05;      // [s] chosen: wheels that turned so lately turn
 constexpr double kWheelPlay = 0.005;  // [rad] chosen: that a wheel at rest may turn: 0.4 mm of its rim
 
 }  // namespace

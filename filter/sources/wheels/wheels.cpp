@@ -29,7 +29,12 @@ void Wheels::update(const WheelIncrement& stamped, const Context& context, Ekf& 
   mounting_.add(stamped, context.imu, x.imu.b_g, motion.R_WB.transpose() * Eigen::Vector3d::UnitZ());
   MeanRate rate = context.imu.mean_rate(increment.from_ns, increment.to_ns);
   rate.noise_factor *= context.gyro_noise;
-  WheelRows rows = linearize_wheels(x, motion.R_WB, motion.v_W, increment, rate.gyro_B, config_.model, sees_ground_);
+  const auto rows_at = [&](const Eigen::Vector3d& v_W, const Eigen::Vector3d& gyro_B) {
+    return linearize_wheels(x, motion.R_WB, v_W, increment, gyro_B, config_.model, sees_ground_);
+  };
+  WheelRows rows = rows_at(motion.v_W, rate.gyro_B);
+  // Wheels that rest show where they point by nothing but noise, and by what shakes the body on its springs.
+  if (context.wheels_rest) rows.H = rows_at(Eigen::Vector3d::Zero(), x.imu.b_g).H;
   show_time_offset(rows, stamped, ekf);
   path_noise_.add(rows.rim_speed, stamped);
   turn_noise_.add(rows.turning, stamped);

@@ -33,6 +33,7 @@ class Wheels {
     CameraUpdate calibration = CameraUpdate::considered;
     double gyro_noise = 1.0;  ///< times the stated one
     bool stands = false;
+    bool wheels_rest = false;  ///< they do not turn, whatever the inertial sensors measure
   };
   /// The filter's state is near the middle of the increment, or has passed it. `stamped`: by the encoders' own clock.
   void update(const WheelIncrement& stamped, const Context& context, Ekf& ekf, Records& records);
