@@ -1,5 +1,6 @@
 #include "filter/ekf/ekf.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "filter/ekf/initial_state.h"
@@ -10,6 +11,10 @@ namespace ear {
 namespace {
 
 constexpr double kUncertainTurn = 5e-3;  // [rad] chosen: standard deviation of one sample that images must confirm
+// Measured, docs/decisions/0056: a rate over the gyroscope's noise density [1/sqrt(s)], a speed over its standard
+// deviation. Those that are less show the clock of the cameras, and the gyroscope, by their errors, which the residuals
+// have too.
+constexpr double kAboveNoise = 50.0;
 
 int error_capacity(const FilterConfig& config) { return err::clone(config.window + 1); }
 
@@ -32,6 +37,12 @@ void correlate_baseline_and_lenses(const CameraState& cameras, const Eigen::Vect
     added.block<1, 3>(focal_length, baseline) = variance * shorter.transpose();
   }
   P.inflate(err::camera, added);
+}
+
+/// Is the velocity much more than its error?
+bool moves(const ImuState& x, const Covariance& P) {
+  const double variance = P.matrix().diagonal().segment<3>(err::nu).maxCoeff();
+  return x.v_W.squaredNorm() > kAboveNoise * kAboveNoise * variance;
 }
 
 }  // namespace
@@ -106,6 +117,7 @@ std::optional<TimeNs> Ekf::propagate(const ImuBuffer& samples, TimeNs t_ns, cons
           total = step;
         }
         last_.rate_B = state_.imu.rate_B(gyro_B);
+        last_.mean_rate_B += std::min(1.0, dt / kStreamGap) * (last_.rate_B - last_.mean_rate_B);
         turned_ += state_.imu.R_WB.row(2).dot(last_.rate_B) * dt;
         turned_path_ += turned_ * dt * state_.imu.v_W;
         const Eigen::Vector3d before_W = state_.imu.v_W;
@@ -113,6 +125,7 @@ std::optional<TimeNs> Ekf::propagate(const ImuBuffer& samples, TimeNs t_ns, cons
         last_.accel_W = (state_.imu.v_W - before_W) / dt;
       });
   state_.imu.t_ns = t_ns;
+  last_.turns = last_.mean_rate_B.norm() > kAboveNoise * usual.gyro * calibration_.imu.gyro_noise;
   const double distance = state_.imu.v_W.norm() * duration;
   covariance_.propagate(total.value_or(ErrorTransition{}), by_matrix, tangent_basis(state_.ground.n_W),
                         normal_walk * normal_walk * distance);
@@ -131,10 +144,16 @@ void Ekf::apply(GroundRows& z, double weight, CameraUpdate calibration) {
 void Ekf::apply(const Eigen::Ref<const Eigen::MatrixXd>& H, int first_column,
                 const Eigen::Ref<const Eigen::VectorXd>& r, CameraUpdate calibration) {
   const bool learned = calibration == CameraUpdate::learned && !calibration_.cameras.empty();
-  const int considered = learned ? 0 : err::calibration_size;
+  int considered = err::camera;  // the first of them: they lie together, up to the clones
+  if (learned && last_.turns) {
+    considered = err::clones;
+  } else if (learned) {
+    considered = moves(state_.imu, covariance_) ? err::gyro_matrix : err::time_offset;
+  }
   const auto variance = [this] { return covariance_.matrix().diagonal().segment<6>(err::b_g); };
   const BiasChanges::Vector6 before = variance();
-  const Eigen::Ref<const Eigen::VectorXd> correction = covariance_.update(H, first_column, r, err::camera, considered);
+  const Eigen::Ref<const Eigen::VectorXd> correction =
+      covariance_.update(H, first_column, r, considered, err::clones - considered);
   if (!correction.allFinite()) return;  // the covariance shows it: possible()
   bias_changes_.add(correction.segment<6>(err::b_g), before - variance());
   boxplus(state_, correction);

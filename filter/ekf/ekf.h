@@ -18,7 +18,7 @@
 namespace ear {
 
 /// What an update does to the calibration of the cameras, and to the gyroscope's matrix. Without a camera these are
-/// always considered.
+/// always considered; and so is the matrix unless the body turns, and the time offset unless it turns or moves.
 enum class CameraUpdate : std::uint8_t {
   learned,    ///< it is corrected as everything else
   considered  ///< its uncertainty counts, its value stays (Schmidt-Kalman): this measurement shows nothing of it
@@ -117,10 +117,13 @@ class Ekf {
   bool running_ = false;
   State state_;
   Covariance covariance_;
-  /// Of the last piece integrated, its means.
+  /// Of the last piece integrated, its means; of the moment up to it, the mean rate, and whether that is more than
+  /// noise.
   struct {
-    Eigen::Vector3d rate_B = Eigen::Vector3d::Zero();   ///< [rad/s]
-    Eigen::Vector3d accel_W = Eigen::Vector3d::Zero();  ///< [m/s^2]
+    Eigen::Vector3d rate_B = Eigen::Vector3d::Zero();       ///< [rad/s]
+    Eigen::Vector3d accel_W = Eigen::Vector3d::Zero();      ///< [m/s^2]
+    Eigen::Vector3d mean_rate_B = Eigen::Vector3d::Zero();  ///< [rad/s]
+    bool turns = false;
   } last_;
   std::uint64_t next_frame_ = 0;
   BiasChanges bias_changes_;

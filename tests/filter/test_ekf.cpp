@@ -167,15 +167,47 @@ TEST_CASE("ekf: the cameras' calibration is learned or considered") {
   for (const CameraUpdate update : {CameraUpdate::learned, CameraUpdate::considered}) {
     CAPTURE(static_cast<int>(update));
     Ekf ekf = started();
-    const double before = ekf.covariance().matrix()(err::time_offset, err::time_offset);
+    const double before = ekf.covariance().matrix()(err::camera, err::camera);
     Eigen::MatrixXd H = Eigen::MatrixXd::Zero(1, err::clones);
     H(0, err::nu) = 10.0;
-    H(0, err::time_offset) = 10.0;
+    H(0, err::camera) = 10.0;
     ekf.apply(H, 0, Eigen::VectorXd::Constant(1, 1.0), update);
     const bool learned = update == CameraUpdate::learned;
-    CHECK((ekf.state().camera.time_offset != 0.0) == learned);
-    CHECK((ekf.covariance().matrix()(err::time_offset, err::time_offset) < before) == learned);
+    CHECK(ekf.state().camera.T_BC0.R.isIdentity(0.0) != learned);
+    CHECK((ekf.covariance().matrix()(err::camera, err::camera) < before) == learned);
     CHECK(ekf.state().imu.v_W.x() != 1.0);
+  }
+}
+
+TEST_CASE("ekf: what may be noise shows nothing of the time offset and the gyroscope") {
+  struct Case {
+    double rate;   // in noise over a second
+    double speed;  // [m/s], with a standard deviation of 0.1
+    bool gyro, time_offset;
+  };
+  for (const Case& c : {Case{20.0, 1.0, false, false}, {20.0, 8.0, false, true}, {200.0, 1.0, true, true}}) {
+    CAPTURE(c.rate);
+    CAPTURE(c.speed);
+    ImuBuffer imu(512);
+    for (TimeNs t_ns = kStart; t_ns <= kStart + 1'000'000'000; t_ns += kPeriod) {
+      imu.push({t_ns, {0.0, 0.0, c.rate * vehicle().imu.gyro_noise}, {0.0, 0.0, 9.81}});
+    }
+    Ekf ekf(FilterConfig{}, vehicle());
+    ImuState x;
+    x.t_ns = kStart;
+    x.v_W = {c.speed, 0.0, 0.0};
+    Eigen::VectorXd sigma = Eigen::VectorXd::Constant(err::clones, 0.1);
+    sigma.segment<3>(err::theta).setConstant(1e-3);
+    sigma.segment<6>(err::b_g).setConstant(1e-3);
+    ekf.start(x, sigma);
+    ekf.propagate(imu, kStart + 1'000'000'000, {}, 0.0);
+    const State before = ekf.state();
+    Eigen::MatrixXd H = Eigen::MatrixXd::Zero(1, err::clones);
+    H(0, err::theta + 2) = H(0, err::time_offset) = H(0, err::camera) = 10.0;
+    ekf.apply(H, 0, Eigen::VectorXd::Constant(1, 1.0), CameraUpdate::learned);
+    CHECK((ekf.state().imu.gyro_matrix != before.imu.gyro_matrix) == c.gyro);
+    CHECK((ekf.state().camera.time_offset != before.camera.time_offset) == c.time_offset);
+    CHECK(ekf.state().camera.T_BC0.R != before.camera.T_BC0.R);
   }
 }
 
