@@ -86,7 +86,7 @@ double median(std::vector<double> values) {
 // The bounds on medians are the mean that was measured over more seeds plus three standard deviations of a median of so
 // many, by the scatter from seed to seed.
 
-// 16 seeds: 0.66 to 1.34 times the error without, median 0.86; 12.5 mm, standard deviation 3.1 mm.
+// 16 seeds: 0.55 to 1.16 times the error without, median 0.88; 14.3 mm, standard deviation 3.0 mm.
 TEST_CASE("wheels and lasers: on waves, the median error of five drives is no larger than without, the slope is known" *
           doctest::skip(test::kStatistics)) {
   std::vector<double> positions;
@@ -101,7 +101,7 @@ TEST_CASE("wheels and lasers: on waves, the median error of five drives is no la
     CHECK(with.inside > 0.99);
     CHECK(with.mode > 0.98);
   }
-  CHECK(median(positions) < 0.0175);
+  CHECK(median(positions) < 0.019);
   CHECK(median(ratios) < 1.0);
 }
 
