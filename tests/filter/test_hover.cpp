@@ -2,6 +2,7 @@
 // gyroscope's scale and of the camera's clock, however long it lasts.
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <optional>
@@ -10,8 +11,10 @@
 
 #include "filter/ekf/so3.h"
 #include "filter/filter.h"
+#include "tests/support/random_state.h"
 
 using namespace ear;
+using ear::test::random_vector;
 
 namespace {
 
@@ -74,7 +77,7 @@ class Scene {
  public:
   explicit Scene(std::mt19937_64& rng) : rng_(rng) {
     for (int i = 0; i < 700; ++i) {
-      Eigen::Vector3d direction(normal_(rng_), normal_(rng_), normal_(rng_));
+      Eigen::Vector3d direction = random_vector(rng_, 1.0);
       direction.z() *= 0.6;
       points_.emplace_back((3.0 + 2.0 * uniform_(rng_)) * direction.normalized());
     }
@@ -106,12 +109,11 @@ class Scene {
     if (p_C.z() < 0.3) return false;
     seen = p_C.head<2>() / p_C.z();
     if (std::abs(seen.x()) > 0.8 || std::abs(seen.y()) > 0.6) return false;
-    seen += kTrackNoise / kFocal * Eigen::Vector2d(normal_(rng_), normal_(rng_));
+    seen += random_vector(rng_, kTrackNoise / kFocal).head<2>();
     return true;
   }
 
   std::mt19937_64& rng_;
-  std::normal_distribution<double> normal_;
   std::uniform_real_distribution<double> uniform_{0.0, 1.0};
   std::vector<Eigen::Vector3d> points_;
   std::map<std::size_t, std::uint64_t> ids_;
@@ -127,21 +129,17 @@ struct Learned {
 /// All else is as the calibration says.
 Learned hover(double turns_at, double duration, std::uint64_t seed) {
   std::mt19937_64 rng{seed};
-  std::normal_distribution<double> normal;
-  const auto noise = [&](double sigma) -> Eigen::Vector3d {
-    return sigma * Eigen::Vector3d(normal(rng), normal(rng), normal(rng));
-  };
   const Calibration calibration = two_cameras();
   Filter filter({}, calibration);
   const Hover truth{turns_at};
   Scene scene(rng);
-  const Eigen::Vector3d b_g = noise(2e-3), b_a = noise(0.03);
+  const Eigen::Vector3d b_g = random_vector(rng, 2e-3), b_a = random_vector(rng, 0.03);
   std::optional<FeatureFrame> waiting;  // for the first sample after it
   for (int k = 0; k * kImuStep < duration; ++k) {
     const double t = k * kImuStep;
     const double shaken = (t < kStands ? 1.0 : kShaken) / std::sqrt(kImuStep);
-    filter.add_imu({stamp(t), truth.gyro_B(t) + b_g + noise(shaken * calibration.imu.gyro_noise),
-                    truth.accel_B(t) + b_a + noise(shaken * calibration.imu.accel_noise)});
+    filter.add_imu({stamp(t), truth.gyro_B(t) + b_g + random_vector(rng, shaken * calibration.imu.gyro_noise),
+                    truth.accel_B(t) + b_a + random_vector(rng, shaken * calibration.imu.accel_noise)});
     if (k % kSamplesPerFrame != 0) continue;
     if (waiting) filter.process(*waiting);
     waiting = scene.seen(t, truth, calibration);

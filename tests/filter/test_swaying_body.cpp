@@ -10,9 +10,11 @@
 #include "filter/ekf/so3.h"
 #include "filter/filter.h"
 #include "tests/support/about.h"
+#include "tests/support/random_state.h"
 
 using namespace ear;
 using ear::test::about;
+using ear::test::random_vector;
 
 namespace {
 
@@ -160,9 +162,6 @@ TEST_CASE("swaying body: the wheels stay as large as the calibration says, and a
 TEST_CASE("swaying body: an engine that shakes a car that stands shows nothing of the wheels' mounting") {
   std::mt19937_64 rng{941};
   std::normal_distribution<double> normal;
-  const auto noise = [&](double sigma) -> Eigen::Vector3d {
-    return sigma * Eigen::Vector3d(normal(rng), normal(rng), normal(rng));
-  };
   Calibration calibration;
   calibration.imu.gyro_noise = 1e-3;
   calibration.imu.accel_noise = 3e-2;
@@ -178,8 +177,8 @@ TEST_CASE("swaying body: an engine that shakes a car that stands shows nothing o
   const Eigen::Vector3d along = Eigen::Vector3d(0.6, 0.2, 0.8).normalized();
   for (int k = 0; k <= 6000; ++k) {
     const double t = k * kImuStep;
-    const Eigen::Vector3d accel = Eigen::Vector3d(0.0, 0.0, 9.81) + 0.8 * normal(rng) * along + noise(0.2);
-    filter.add_imu({stamp(t), noise(0.02), accel});
+    const Eigen::Vector3d accel = Eigen::Vector3d(0.0, 0.0, 9.81) + 0.8 * normal(rng) * along + random_vector(rng, 0.2);
+    filter.add_imu({stamp(t), random_vector(rng, 0.02), accel});
     filter.add_encoder({stamp(t), 0, 0});
     if (k % 5 == 0) filter.process_without_image(stamp(t));
   }

@@ -10,6 +10,7 @@
 namespace ear {
 namespace {
 
+constexpr double kNoRest = 0.05;      // [s] chosen: wheels that turned so lately turn
 constexpr double kWheelPlay = 0.005;  // [rad] chosen: that a wheel at rest may turn: 0.4 mm of its rim
 
 }  // namespace
@@ -36,6 +37,8 @@ Standstill::Standstill(const StandstillConfig& config, double focal_px, int wind
   renewed_.reserve(kFeatureCapacity);
   for (auto& component : flow_) component.reserve(kFeatureCapacity);
 }
+
+bool Standstill::wheels_rest(TimeNs t_ns) const { return wheel_rest_.duration(t_ns).value_or(0.0) >= kNoRest; }
 
 ImuStatistics Standstill::recent(const ImuBuffer& imu, TimeNs t_ns) const {
   return imu.statistics(t_ns - static_cast<TimeNs>(1e9 * config_.duration), t_ns);

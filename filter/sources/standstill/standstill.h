@@ -49,7 +49,7 @@ class Standstill {
   /// Has the vehicle stood for config.duration?
   [[nodiscard]] bool stands() const { return stands_; }
   /// Do the wheels not turn, whether the vehicle stands or not?
-  [[nodiscard]] bool wheels_rest(TimeNs t_ns) const { return wheel_rest_.duration(t_ns).value_or(0.0) >= kNoRest; }
+  [[nodiscard]] bool wheels_rest(TimeNs t_ns) const;
   /// Samples of the last config.duration seconds before `t_ns`.
   [[nodiscard]] ImuStatistics recent(const ImuBuffer& imu, TimeNs t_ns) const;
 
@@ -57,8 +57,6 @@ class Standstill {
   void hold(Ekf& ekf);
 
  private:
-  static constexpr double kNoRest = 0.05;  // [s] chosen: wheels that turned so lately turn
-
   void restart(const FeatureFrame& frame);
   void renew_reference(const FeatureFrame& frame);
   void sort_reference();
