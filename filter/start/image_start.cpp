@@ -75,7 +75,7 @@ std::vector<Point> points_of(const std::vector<const TimedFrame*>& frames) {
 /// Of a residual with this standard deviation, by Huber.
 double weight_of(double residual, double sigma) { return std::min(1.0, kHuber * sigma / residual) / (sigma * sigma); }
 
-/// Normal equations of one point, and of it with the other unknowns.
+/// Normal equations of one point, and of it with the other unknowns, up to the last that it depends on.
 struct PointSums {
   Eigen::Matrix3d A;
   Eigen::Vector3d b;
@@ -87,13 +87,13 @@ struct PointSums {
     A_others.setZero(others, 3);
   }
   [[nodiscard]] Eigen::Vector3d step(const Eigen::VectorXd& others) const {
-    return A.ldlt().solve(b - A_others.transpose() * others);
+    return A.ldlt().solve(b - A_others.transpose() * others.head(A_others.rows()));
   }
 };
 
 /// Normal equations of the unknowns that the points share: the state, then the errors of the path.
 struct SharedSums {
-  Eigen::MatrixXd A;
+  Eigen::MatrixXd A;  ///< its lower half
   Eigen::VectorXd b;
 
   explicit SharedSums(Eigen::Index size) : A(Eigen::MatrixXd::Zero(size, size)), b(Eigen::VectorXd::Zero(size)) {}
@@ -101,8 +101,18 @@ struct SharedSums {
   void eliminate(PointSums& point) {
     point.A.diagonal().array() += 1e-9 * point.A.trace();  // a point at infinity has some depth
     const Eigen::LDLT<Eigen::Matrix3d> of_A(point.A);
-    A.noalias() -= point.A_others * of_A.solve(point.A_others.transpose());
-    b -= point.A_others * of_A.solve(point.b);
+    const Eigen::Matrix3d inverse = of_A.solve(Eigen::Matrix3d::Identity());
+    const auto& others = point.A_others;
+    for (Eigen::Index j = 0; j < others.rows(); ++j) {
+      if (others.row(j).isZero(0.0)) continue;
+      const Eigen::Vector3d weighted = inverse * others.row(j).transpose();
+      const Eigen::Index rows = others.rows() - j;
+      A.col(j).segment(j, rows) -= others.bottomRows(rows).lazyProduct(weighted);
+      b(j) -= weighted.dot(point.b);
+    }
+  }
+  [[nodiscard]] StartFit::Matrix of_state() const {
+    return A.topLeftCorner<StartFit::size, StartFit::size>().selfadjointView<Eigen::Lower>();
   }
 };
 
@@ -143,7 +153,8 @@ class Problem {
   void add_turn(std::size_t k, Eigen::Matrix3d& A, Eigen::Vector3d& b) const;
   void guess();
   double iterate();
-  void measure_noise(const Eigen::MatrixXd& W, const Eigen::MatrixXd& covariance);
+  void measure_noise(const Eigen::MatrixXd& W, const Eigen::LLT<Eigen::MatrixXd>& of_A_e,
+                     const Eigen::MatrixXd& by_state, const StartFit::Matrix& covariance);
   [[nodiscard]] bool fits() const;
   [[nodiscard]] bool shows_length() const;
   void integrate();
@@ -239,14 +250,14 @@ void Problem::guess() {
       sums.A += J.transpose() * J;
       sums.b += J.transpose() * r;
       sums.A_others += J_x.transpose() * J;
-      shared.A += J_x.transpose() * J_x;
+      shared.A += J_x.transpose().lazyProduct(J_x);
       shared.b += J_x.transpose() * r;
     }
     shared.eliminate(sums);
   }
   const double weight = 1.0 / (noise_.feature_sigma * noise_.feature_sigma);
   StartFit fit(noise_.prior_sigma);
-  fit.add(weight * shared.A, weight * shared.b);
+  fit.add(weight * shared.of_state(), weight * shared.b);
   const StartFit::Vector step = fit.solution();
   x_ += step;
   for (std::size_t i = 0; i < points_.size(); ++i) {
@@ -264,7 +275,7 @@ double Problem::iterate() {
   for (std::size_t i = 0; i < points_.size(); ++i) {
     Point& point = points_[i];
     PointSums& sums = sums_[i];
-    sums.clear(shared.b.size());
+    sums.clear(n + StartMoment::errors_before(point.sights.back().moment + 1));
     images_.clear();
     for (const Sight& sight : point.sights) {
       images_.push_back(image_of(point.value, x_, moments_[sight.moment], cameras_, sight.camera));
@@ -280,7 +291,7 @@ double Problem::iterate() {
       sums.A += weight * image.by_point.transpose() * image.by_point;
       sums.b += weight * image.by_point.transpose() * r;
       sums.A_others.topRows<n>() += by_state * image.by_point;
-      shared.A.topLeftCorner<n, n>() += by_state * image.by_state;
+      shared.A.topLeftCorner<n, n>() += by_state.lazyProduct(image.by_state);
       shared.b.head<n>() += by_state * r;
       if (sight.moment == 0) continue;
       const Eigen::Index at = n + StartMoment::errors_before(sight.moment);
@@ -288,7 +299,7 @@ double Problem::iterate() {
       by_error << image.by_turn, image.by_position;
       const Eigen::Matrix<double, StartMoment::errors, 2> weighted = weight * by_error.transpose();
       sums.A_others.middleRows<StartMoment::errors>(at) += weighted * image.by_point;
-      shared.A.block<StartMoment::errors, n>(at, 0) += weighted * image.by_state;
+      shared.A.block<StartMoment::errors, n>(at, 0) += weighted.lazyProduct(image.by_state);
       shared.A.block<StartMoment::errors, StartMoment::errors>(at, at) += weighted * by_error;
       shared.b.segment<StartMoment::errors>(at) += weighted * r;
     }
@@ -299,11 +310,10 @@ double Problem::iterate() {
   const Eigen::MatrixXd A_e = shared.A.bottomRightCorner(m, m) + W;
   const Eigen::MatrixXd A_ex = shared.A.bottomLeftCorner(m, n);
   const Eigen::VectorXd b_e = shared.b.tail(m) - W * errors_;
-  const Eigen::LDLT<Eigen::MatrixXd> of_A_e(A_e);
+  const Eigen::LLT<Eigen::MatrixXd> of_A_e(A_e);
   const Eigen::MatrixXd by_state = of_A_e.solve(A_ex);
   fit_ = StartFit(noise_.prior_sigma, x_);
-  fit_.add(shared.A.topLeftCorner<n, n>() - A_ex.transpose() * by_state,
-           shared.b.head<n>() - A_ex.transpose() * of_A_e.solve(b_e));
+  fit_.add(shared.of_state() - A_ex.transpose() * by_state, shared.b.head<n>() - A_ex.transpose() * of_A_e.solve(b_e));
   Eigen::VectorXd step(n + m);
   step.head<n>() = fit_.step(x_);
   step.tail(m) = of_A_e.solve(b_e - A_ex * step.head<n>());
@@ -311,17 +321,22 @@ double Problem::iterate() {
   errors_ += step.tail(m);
   for (std::size_t i = 0; i < points_.size(); ++i) points_[i].value += sums_[i].step(step);
   const StartFit::Matrix covariance = fit_.information(x_).inverse();
-  measure_noise(W, of_A_e.solve(Eigen::MatrixXd::Identity(m, m)) + by_state * covariance * by_state.transpose());
+  measure_noise(W, of_A_e, by_state, covariance);
   const double variance = covariance.topLeftCorner<3, 3>().trace();
   return step.segment<3>(StartFit::velocity).norm() / std::sqrt(variance);
 }
 
-/// How noisy the inertial samples are, by the errors of the path, of this covariance; W is the inverse of that by the
-/// noise believed so far. Of each part the squares over what the images determine of them (MacKay 1992); the stated
-/// noise counts for one more.
-void Problem::measure_noise(const Eigen::MatrixXd& W, const Eigen::MatrixXd& covariance) {
+/// How noisy the inertial samples are, by the errors of the path. Their covariance is C = A_e^-1 + B P B^T, with that
+/// of the state, P, and what they follow of it, B; W is the inverse of what it is by the noise believed so far. Of each
+/// part the squares over what the images determine of them (MacKay 1992); the stated noise counts for one more.
+void Problem::measure_noise(const Eigen::MatrixXd& W, const Eigen::LLT<Eigen::MatrixXd>& of_A_e,
+                            const Eigen::MatrixXd& by_state, const StartFit::Matrix& covariance) {
   const Eigen::VectorXd weighted = W * errors_;
-  const Eigen::MatrixXd seen = W - W * covariance * W;
+  const Eigen::MatrixXd W_B = W * by_state;
+  const Eigen::MatrixXd half = of_A_e.matrixL().solve(W);
+  Eigen::MatrixXd seen = W - W_B * covariance * W_B.transpose();  // W - W C W
+  seen.selfadjointView<Eigen::Lower>().rankUpdate(half.transpose(), -1.0);
+  seen.triangularView<Eigen::StrictlyUpper>() = seen.transpose();
   for (std::size_t i = 0; i < 2; ++i) {
     const double squares = noisier_[i] * noisier_[i] * weighted.dot(stated_[i] * weighted);
     const double determined = noisier_[i] * stated_[i].cwiseProduct(seen).sum();
