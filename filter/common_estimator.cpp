@@ -18,7 +18,7 @@ RelativeMotion motion_between(const Pose& T_WB0, const NavState& next) {
   RelativeMotion motion;
   motion.R_B1B0 = next.q_WB.toRotationMatrix().transpose() * T_WB0.R;
   motion.p_B0B1 = T_WB0.R.transpose() * (next.p_WB - T_WB0.p);
-  motion.translation_known = true;
+  motion.rotation_known = motion.translation_known = true;
   return motion;
 }
 
@@ -210,7 +210,9 @@ std::optional<RelativeMotion> CommonEstimator::motion_to(TimeNs t_ns) const {
   }
   RelativeMotion motion;
   const TimeNs from_ns = imu_time(last->t_ns, camera);
-  motion.R_B1B0 = gyro_rotation(from_ns, to_ns, Eigen::Vector3d::Zero(), ingest_.imu()).transpose();
+  motion.rotation_known = ekf_.running();
+  const Eigen::Vector3d b_g = motion.rotation_known ? ekf_.state().imu.b_g : Eigen::Vector3d::Zero();
+  motion.R_B1B0 = gyro_rotation(from_ns, to_ns, b_g, ingest_.imu()).transpose();
   return motion;
 }
 

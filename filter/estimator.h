@@ -14,10 +14,11 @@
 
 namespace ear {
 
-/// How the body moved between two frames.
+/// How the body moved between two frames, as the inertial samples tell.
 struct RelativeMotion {
   Eigen::Matrix3d R_B1B0 = Eigen::Matrix3d::Identity();
   Eigen::Vector3d p_B0B1 = Eigen::Vector3d::Zero();  ///< [m]
+  bool rotation_known = false;  ///< without what the gyroscope's bias turns; before a start that is not known
   bool translation_known = false;
 };
 

@@ -27,6 +27,7 @@ constexpr int kLevelMeasured = 0;          // where to begin: with depth and a m
 constexpr int kLevelPredicted = 2;         // with a predicted rotation,
 constexpr int kLevelUnknown = ImagePyramid::kMaxLevels - 1;  // and without
 constexpr float kFar = 1e3F;                                 // [px] of a prediction: nothing is known of its error
+constexpr double kInverseDepthChange = 0.1;                  // chosen [1/m]: of a depth by motion, until the next frame
 constexpr std::size_t kProbes = 24;                          // features that measure the motion for the others
 constexpr float kRefreshStretch = 1.3F;  // a feature that has grown or shrunk this much gets a new patch
 
@@ -94,6 +95,7 @@ class Frontend::Impl {
   [[nodiscard]] int level_without_depth(const Transfer& measured) const;
   [[nodiscard]] Flow flow(std::size_t track) const;
   void reject();
+  void find_depths();
   void match_stereo();
   void match_stereo(Track& track, bool had_right);
   void detect();
@@ -115,8 +117,9 @@ class Frontend::Impl {
   std::size_t max_features_ = 0;  // for now
   bool use_right_ = true;
   bool right_present_ = false;
-  MotionGuess motion_;     // of the left camera, last frame to this one
-  float surprise_ = kFar;  // largest of the last frame's probes [px]
+  MotionGuess motion_;                // of the left camera, last frame to this one
+  float surprise_ = kFar;             // largest of the last frame's probes [px]
+  double usual_inverse_depth_ = 0.0;  // where the right camera shows none: the median [1/m]
   std::vector<Track> tracks_;
   std::vector<Track> previous_;  // the same tracks, index by index, before this frame
   std::vector<ReferencePatch> patches_;
@@ -128,6 +131,7 @@ class Frontend::Impl {
   std::vector<std::size_t> candidates_, probes_;
   std::vector<Flow> flows_;
   std::vector<Eigen::Vector2f> pixels_;
+  std::vector<double> inverse_depths_;
 };
 
 Frontend::Impl::Impl(const FrontendConfig& config, std::vector<CameraCalibration> cameras)
@@ -158,12 +162,14 @@ void Frontend::Impl::allocate() {
   probes_.reserve(most);
   flows_.reserve(most);
   pixels_.reserve(most);
+  inverse_depths_.reserve(most);
   flow_check_.reserve(most);
 }
 
 void Frontend::Impl::reset() {
   tracks_.clear();
   surprise_ = kFar;
+  usual_inverse_depth_ = 0.0;
   left_.clear();
   free_patches_.clear();
   for (std::size_t i = 0; i < patches_.size(); ++i) free_patches_.push_back(i);
@@ -189,6 +195,7 @@ const FeatureFrame& Frontend::Impl::process(const StereoFrame& frame, const Moti
   track(prediction);
   timing.track = watch.lap();
   reject();
+  if (!right_present_) find_depths();
   timing.reject = watch.lap();
   match_stereo();
   timing.stereo = watch.lap();
@@ -205,7 +212,7 @@ MotionGuess Frontend::Impl::camera_motion(const MotionPrediction& prediction) co
   guess.rotation_known = prediction.rotation_known;
   guess.translation_known = prediction.rotation_known && prediction.translation_known;
   Eigen::Isometry3d T_B1B0 = Eigen::Isometry3d::Identity();
-  if (guess.rotation_known) T_B1B0.linear() = prediction.R_B1B0;
+  T_B1B0.linear() = prediction.R_B1B0;
   if (guess.translation_known) T_B1B0.translation() = -(prediction.R_B1B0 * prediction.p_B0B1);
   const Eigen::Isometry3d& T_BC = cameras_.front().T_BC;
   const Eigen::Isometry3d T_C1C0 = T_BC.inverse() * T_B1B0 * T_BC;
@@ -334,6 +341,35 @@ void Frontend::Impl::reject() {
   drop(flow_check_.find(flows_, motion_).inliers);
 }
 
+// Where the right camera shows no depths, a motion of known length does, by how far a feature moved along its epipolar
+// line: least squares with what was thought of it before. New features get the median of all. They say where to search
+// in the next frame; flows are not judged by them, as the length is the prediction's.
+void Frontend::Impl::find_depths() {
+  usual_inverse_depth_ = 0.0;
+  if (!motion_.translation_known || tracks_.empty()) return;
+  const Transfer& motion = motion_.motion;
+  const double prior = std::pow(1.0 / (lens_.focal_px() * kInverseDepthChange), 2);  // against a pixel
+  inverse_depths_.clear();
+  for (std::size_t i = 0; i < tracks_.size(); ++i) {
+    Track& track = tracks_[i];
+    const Track& before = previous_[i];
+    if (!track.has_depth) {
+      const Eigen::Vector3d far = motion.R_10 * before.left_ray.homogeneous();
+      const Eigen::Vector2d moved = track.left_ray * far.z() - far.head<2>();
+      const Eigen::Vector2d per_inverse_depth = motion.p_10.head<2>() - track.left_ray * motion.p_10.z();
+      const double thought = before.surface.inverse_depth(before.left_ray);
+      const double inverse_depth =
+          std::max(0.0, (per_inverse_depth.dot(moved) + prior * thought) / (per_inverse_depth.squaredNorm() + prior));
+      const Eigen::Vector3d point = motion.scaled_point(before.left_ray, inverse_depth);
+      track.surface = SurfacePatch::through(track.left_ray, point.z() > 0.0 ? inverse_depth / point.z() : 0.0);
+    }
+    inverse_depths_.push_back(track.surface.inverse_depth(track.left_ray));
+  }
+  const auto middle = inverse_depths_.begin() + static_cast<std::ptrdiff_t>(inverse_depths_.size() / 2);
+  std::nth_element(inverse_depths_.begin(), middle, inverse_depths_.end());
+  usual_inverse_depth_ = *middle;
+}
+
 void Frontend::Impl::match_stereo() {
   if (!right_present_) return;
   for (std::size_t i = 0; i < tracks_.size(); ++i) match_stereo(tracks_[i], previous_[i].has_right);
@@ -378,7 +414,11 @@ void Frontend::Impl::detect() {
     track.id = next_id_++;
     track.left.centre = corner.pixel;
     track.left_ray = *ray;
-    if (right_present_) match_stereo(track, false);
+    if (right_present_) {
+      match_stereo(track, false);
+    } else {
+      track.surface = SurfacePatch::through(track.left_ray, usual_inverse_depth_);
+    }
     tracks_.push_back(track);
   }
 }

@@ -12,7 +12,8 @@
 
 namespace ear {
 
-/// How the body is thought to have moved from the last frame (B0) to this one (B1), from IMU and odometer.
+/// How the body is thought to have moved from the last frame (B0) to this one (B1), from IMU and odometer. A rotation
+/// that is not known (to about a pixel) still says where to search, but flows are not judged by it.
 struct MotionPrediction {
   Eigen::Matrix3d R_B1B0 = Eigen::Matrix3d::Identity();
   Eigen::Vector3d p_B0B1 = Eigen::Vector3d::Zero();  ///< position of B1 in B0 [m]

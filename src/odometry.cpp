@@ -21,7 +21,7 @@ MotionPrediction to_prediction(const std::optional<RelativeMotion>& motion) {
   if (!motion) return prediction;
   prediction.R_B1B0 = motion->R_B1B0;
   prediction.p_B0B1 = motion->p_B0B1;
-  prediction.rotation_known = true;
+  prediction.rotation_known = motion->rotation_known;
   prediction.translation_known = motion->translation_known;
   return prediction;
 }

@@ -2,9 +2,11 @@
 
 #include <doctest/doctest.h>
 
+#include <Eigen/Geometry>
 #include <cmath>
 
 #include "filter/ekf/initial_state.h"
+#include "filter/filter.h"
 #include "tools/simulator/simulation.h"
 
 using namespace ear;
@@ -92,4 +94,30 @@ TEST_CASE("moving start: at five frames a second features last for three frames,
   CHECK((state->R_WB.transpose() * state->v_W - truth.R_WB.transpose() * truth.v_W).norm() < 0.3);
   one_camera = true;
   CHECK_FALSE(start(simulation, 12.0, short_lived));
+}
+
+TEST_CASE("moving start: until then the turn from frame to frame is a guess, by a gyroscope whose bias is not known") {
+  const simulator::Simulation simulation = fly(10.0, 834);
+  Filter filter({}, simulation.calibration());
+  const TimeNs begin_ns = simulation.imu().front().t_ns + 10'000'000'000;
+  auto sample = simulation.imu().begin();
+  int guesses = 0, known = 0;
+  for (std::size_t i = 0; i < simulation.frame_times().size() && known < 5; ++i) {
+    const TimeNs t_ns = simulation.frame_times()[i];
+    if (t_ns < begin_ns) continue;
+    for (; sample != simulation.imu().end() && sample->t_ns <= t_ns + 10'000'000; ++sample) {
+      if (sample->t_ns >= begin_ns - 100'000'000) filter.add_imu(*sample);
+    }
+    if (const std::optional<RelativeMotion> motion = filter.motion_to(t_ns)) {
+      const simulator::Truth before = simulation.truth(simulation.frame_times()[i - 1]), now = simulation.truth(t_ns);
+      const Eigen::Matrix3d R_B1B0 = now.R_WB.transpose() * before.R_WB;
+      const double off = Eigen::AngleAxisd(motion->R_B1B0 * R_B1B0.transpose()).angle();
+      CHECK(off < (motion->rotation_known ? 3e-3 : 0.02));
+      (motion->rotation_known ? known : guesses) += 1;
+      CHECK(motion->translation_known == motion->rotation_known);
+    }
+    static_cast<void>(filter.process(simulation.tracks(i)));
+  }
+  CHECK(guesses >= 10);
+  CHECK(known == 5);
 }

@@ -187,7 +187,7 @@ void swing() {
     const cv::Mat right = cameras[1].render(T_WB, scene);
     MotionPrediction prediction;
     if (const std::optional<RelativeMotion> motion = filter.motion_to(t_ns)) {
-      prediction = {motion->R_B1B0, motion->p_B0B1, true, motion->translation_known};
+      prediction = {motion->R_B1B0, motion->p_B0B1, motion->rotation_known, motion->translation_known};
     }
     const FeatureFrame& frame = frontend.process({t_ns, view_of(left), view_of(right)}, prediction);
     if (const std::optional<Estimate> estimate = filter.process(frame)) print("pipeline", *estimate);
