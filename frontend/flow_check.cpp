@@ -5,7 +5,6 @@
 #include <numeric>
 #include <optional>
 
-#include "frontend/essential_matrix.h"
 #include "frontend/motion_of_flows.h"
 
 namespace ear {
@@ -17,6 +16,7 @@ constexpr int kMaxTrials = 60;
 constexpr double kConfidence = 0.999;
 constexpr double kGoodGuess = 0.8;          // share of inliers at which a known motion needs no search
 constexpr double kUnknownDepthSigma = 3.0;  // [1/m] a feature without depth may be anywhere beyond 0.2 m or so
+constexpr int kSteps = 5;                   // from a guess
 constexpr int kRefinements = 3;
 constexpr double kSettled = 0.03;  // times the tolerance: a step that moves no flow further is the last
 constexpr double kStill = 0.5;     // times the tolerance: a smaller flow is none
@@ -146,10 +146,6 @@ void FlowCheck::find_into(const std::vector<Flow>& flows, const MotionGuess& gue
     if (flows[i].has_depth) with_depth.push_back(i);
   }
   const bool metric = with_depth.size() >= kMinDepths;
-  if (!metric && !guess.rotation_known) {
-    flags = essential_inliers(flows, tolerance_, kConfidence);
-    return;
-  }
 
   Problem problem{flows, tolerance_};
   Candidate best{guess.motion, flags};
@@ -166,6 +162,21 @@ void FlowCheck::find_into(const std::vector<Flow>& flows, const MotionGuess& gue
     std::vector<std::size_t>& all = indices_;
     all.resize(flows.size());
     std::iota(all.begin(), all.end(), std::size_t{0});
+    if (!guess.rotation_known) {
+      search<5>(
+          problem, all, random_,
+          [&](const std::array<std::size_t, 5>& s) {
+            used_.assign(flows.size(), 0);
+            for (const std::size_t i : s) used_[i] = 1;
+            return refine_turn(flows, used_, guess.motion, kSteps);
+          },
+          best, trial_);
+      if (const auto refined = refine_turn(flows, best.flags, best.motion, kRefinements)) {
+        problem.classify(*refined, trial_);
+        if (count(trial_) >= best.inliers) best.flags.swap(trial_);
+      }
+      return;
+    }
     search<2>(
         problem, all, random_,
         [&](const std::array<std::size_t, 2>& s) -> std::optional<Transfer> {
@@ -193,7 +204,7 @@ void FlowCheck::find_into(const std::vector<Flow>& flows, const MotionGuess& gue
         [&](const std::array<std::size_t, 3>& s) -> std::optional<Transfer> {
           used_.assign(flows.size(), 0);
           for (const std::size_t i : s) used_[i] = 1;
-          return refine_motion(flows, used_, guess.motion, 5, settled);
+          return refine_motion(flows, used_, guess.motion, kSteps, settled);
         },
         best, trial_);
   }

@@ -46,8 +46,7 @@ class FlowCheck {
   /// With too few flows to measure it, the motion is the guess; all are inliers if its rotation is known, else none is.
   /// Where no depths tell the motion, flows of length zero that a fully known guess would have moved, whatever their
   /// depth, are no inliers: what they show moves with the camera.
-  /// Valid until the next call. Asks for no memory with up to as many flows as were reserved, unless neither rotation
-  /// nor depths are known.
+  /// Valid until the next call. Asks for no memory with up to as many flows as were reserved.
   [[nodiscard]] const Consensus& find(const std::vector<Flow>& flows, const MotionGuess& guess);
 
  private:

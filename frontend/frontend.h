@@ -26,8 +26,7 @@ struct FrontendTiming {
   double pyramid = 0.0, track = 0.0, detect = 0.0, stereo = 0.0, reject = 0.0;
 };
 
-/// Runs on the calling thread. Library calls may use OpenCV's threads unless the program calls cv::setNumThreads(1);
-/// the result is the same bit for bit.
+/// Runs on the calling thread.
 class Frontend {
  public:
   /// Throws std::invalid_argument if there is no camera or a calibration is unusable.

@@ -1,6 +1,7 @@
 #include "frontend/motion_of_flows.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
 
@@ -9,6 +10,11 @@ namespace {
 
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
+
+void turn(Eigen::Matrix3d& R, const Eigen::Vector3d& by) {
+  const double angle = by.norm();
+  if (angle > 1e-12) R = Eigen::AngleAxisd(angle, by / angle).toRotationMatrix() * R;
+}
 
 }  // namespace
 
@@ -41,13 +47,46 @@ std::optional<Transfer> refine_motion(const std::vector<Flow>& flows, const std:
     const Vector6d change = information.llt().solve(gradient);
     if (!change.allFinite()) return std::nullopt;
     const double angle = change.head<3>().norm();
-    if (angle > 1e-12) {
-      motion.R_10 = Eigen::AngleAxisd(angle, change.head<3>() / angle).toRotationMatrix() * motion.R_10;
-    }
+    turn(motion.R_10, change.head<3>());
     motion.p_10 += change.tail<3>();
     // What is left after a step is of the order of its square. No flow moves further than the angle and the translation
     // in units of its depth.
     if (angle + nearest * change.tail<3>().norm() < settled) break;
+  }
+  return motion;
+}
+
+// The first direction is the one most nearly perpendicular to the normals of all planes.
+std::optional<Transfer> refine_turn(const std::vector<Flow>& flows, const std::vector<std::uint8_t>& used,
+                                    Transfer motion, int steps) {
+  Eigen::Matrix3d normals = Eigen::Matrix3d::Zero();
+  for (std::size_t i = 0; i < flows.size(); ++i) {
+    if (!used[i]) continue;
+    const Eigen::Vector3d n = flows[i].x1.homogeneous().cross(motion.R_10 * flows[i].x0.homogeneous());
+    normals += n * n.transpose();
+  }
+  Eigen::Vector3d& p = motion.p_10;
+  p = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(normals).eigenvectors().col(0);
+  for (int step = 0; step < steps; ++step) {
+    Matrix6d information = 1e-9 * Matrix6d::Identity();
+    Vector6d gradient = Vector6d::Zero();
+    for (std::size_t i = 0; i < flows.size(); ++i) {
+      if (!used[i]) continue;
+      const Eigen::Vector3d turned = motion.R_10 * flows[i].x0.homogeneous();
+      const Eigen::Vector3d found = flows[i].x1.homogeneous();
+      const Eigen::Vector3d normal = found.cross(turned);
+      Vector6d J;
+      J << turned.cross(p.cross(found)), normal;
+      // The residual over this is the distance from the epipolar line.
+      const double weight = 1.0 / (1e-6 + p.cross(turned).head<2>().squaredNorm());
+      information.noalias() += weight * J * J.transpose();
+      gradient.noalias() -= weight * p.dot(normal) * J;
+    }
+    information.bottomRightCorner<3, 3>() += p * p.transpose() * information.trace();  // its length stays
+    const Vector6d change = information.llt().solve(gradient);
+    if (!change.allFinite()) return std::nullopt;
+    turn(motion.R_10, change.head<3>());
+    p = (p + change.tail<3>()).normalized();
   }
   return motion;
 }

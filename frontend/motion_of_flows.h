@@ -17,6 +17,12 @@ namespace ear {
                                                     const std::vector<std::uint8_t>& used, Transfer motion, int steps,
                                                     double settled);
 
+/// Gauss-Newton over rotation, from that of `motion` on, and direction of the translation, a unit vector, on the flows
+/// whose flag in `used` is set, whatever their depths: a point stays in the plane of its ray and the translation,
+/// p . (x1 x R x0) = 0. Five flows determine it. Nothing if they diverge.
+[[nodiscard]] std::optional<Transfer> refine_turn(const std::vector<Flow>& flows, const std::vector<std::uint8_t>& used,
+                                                  Transfer motion, int steps);
+
 /// Translation [m] from two flows with depth and a known rotation.
 [[nodiscard]] std::optional<Eigen::Vector3d> solve_translation(const std::vector<Flow>& flows, std::size_t a,
                                                                std::size_t b, const Eigen::Matrix3d& R_10);

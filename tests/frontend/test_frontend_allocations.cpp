@@ -30,9 +30,13 @@ TEST_CASE("front end: no memory is asked for once a camera moves, turns, is cove
     return;
   }
   cv::setNumThreads(1);
-  const std::vector<CameraCalibration> cameras = test_stereo_pair();
+  bool stereo = true;
+  SUBCASE("two cameras") {}
+  SUBCASE("one camera, whose turn is a guess in every third frame") { stereo = false; }
+  std::vector<CameraCalibration> cameras = test_stereo_pair();
   const std::vector<TexturedRectangle> scene{wall(1.5, 32), floor_below(0.3, 33)};
   const Camera left(cameras[0]), right(cameras[1]);
+  if (!stereo) cameras.pop_back();
   Frontend frontend({100, 0.3}, cameras);
   std::mt19937 random(31);
   std::size_t features = 0;
@@ -49,8 +53,10 @@ TEST_CASE("front end: no memory is asked for once a camera moves, turns, is cove
     const cv::Mat image1 = covered ? dark(320, 240, random) : right.render(T_WB, scene);
     MotionPrediction prediction = exact_motion(before_W, T_WB);
     prediction.translation_known = i % 2 == 0;
+    if (!stereo && i % 3 == 0) prediction.rotation_known = prediction.translation_known = false;
     const std::uint64_t before = tools::thread_allocations();
-    const FeatureFrame& frame = frontend.process({i * 100'000'000, view_of(image0), view_of(image1)}, prediction);
+    const StereoFrame images{i * 100'000'000, view_of(image0), stereo ? view_of(image1) : ImageView{}};
+    const FeatureFrame& frame = frontend.process(images, prediction);
     const std::uint64_t allocations = tools::thread_allocations() - before;
     if (i >= kWarmUp) CHECK(allocations == 0);
     for (const FeatureObservation& feature : frame.features) {
