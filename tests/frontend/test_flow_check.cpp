@@ -5,6 +5,7 @@
 #include <random>
 
 #include "frontend/flow_check.h"
+#include "frontend/motion_of_flows.h"
 
 namespace ear {
 namespace {
@@ -101,6 +102,28 @@ TEST_CASE("flow check: without depth, what leaves its epipolar plane is found") 
   const Score unknown = score(example, check.find(example.flows, {}).inliers);
   CHECK(unknown.kept_static >= 70);
   CHECK(unknown.kept_moving <= 5);
+}
+
+TEST_CASE("flow check: turn and direction of flows without depth, from a guess on, to the last digit") {
+  for (const unsigned seed : {5U, 6U, 7U}) {
+    CAPTURE(seed);
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> uniform(-1.0, 1.0);
+    const Eigen::Vector3d axis = Eigen::Vector3d(uniform(random), uniform(random), uniform(random)).normalized();
+    const Transfer motion{Eigen::AngleAxisd(0.2, axis).toRotationMatrix(),
+                          Eigen::Vector3d(uniform(random), uniform(random), uniform(random)).normalized()};
+    std::vector<Flow> flows(20);
+    for (Flow& flow : flows) {
+      flow.x0 = 0.6 * Eigen::Vector2d(uniform(random), uniform(random));
+      flow.x1 = motion.scaled_point(flow.x0, 0.15 + 0.05 * uniform(random)).hnormalized();
+    }
+    const Transfer guess{Eigen::AngleAxisd(0.15, axis).toRotationMatrix(), Eigen::Vector3d::Zero()};
+    const auto found = refine_turn(flows, std::vector<std::uint8_t>(flows.size(), 1), guess, 6);
+    REQUIRE(found);
+    CHECK((found->R_10 - motion.R_10).norm() < 1e-7);
+    CHECK(found->p_10.cross(motion.p_10).norm() < 1e-6);
+    CHECK(found->p_10.norm() == doctest::Approx(1.0));
+  }
 }
 
 TEST_CASE("flow check: a camera that stands or only turns keeps all of a static scene") {
