@@ -37,8 +37,8 @@ struct Track {
   std::size_t patch = 0;  // index into the store
   Warp left;              // of the reference patch
   Eigen::Vector2d left_ray = Eigen::Vector2d::Zero();
-  bool has_depth = false;  // known from this or an earlier frame
-  SurfacePatch surface;    // in the left camera of this frame; at infinity without depth
+  bool has_depth = false;  // by the right camera, in this or an earlier frame
+  SurfacePatch surface;    // in the left camera of this frame; without depth at infinity, or where the motion shows it
   bool has_right = false;  // seen by the right camera in this frame
   Eigen::Vector2d right_ray = Eigen::Vector2d::Zero();
   float surprise = 0.0F;  // in the left image, distance from where the motion put it [px]
