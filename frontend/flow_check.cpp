@@ -118,6 +118,17 @@ void search(const Problem& problem, const std::vector<std::size_t>& from, std::m
   }
 }
 
+// Takes this motion in place of the best one if as many flows agree with it.
+void prefer(const Problem& problem, const std::optional<Transfer>& refined, Candidate& best, Flags& trial_flags) {
+  if (!refined) return;
+  problem.classify(*refined, trial_flags);
+  const std::size_t inliers = count(trial_flags);
+  if (inliers < best.inliers) return;
+  best.motion = *refined;
+  best.flags.swap(trial_flags);
+  best.inliers = inliers;
+}
+
 }  // namespace
 
 void FlowCheck::reserve(std::size_t flows) {
@@ -155,6 +166,11 @@ void FlowCheck::find_into(const std::vector<Flow>& flows, const MotionGuess& gue
     return static_cast<double>(inliers) >= kGoodGuess * static_cast<double>(flows.size());
   };
   const bool search_needed = !enough(best.inliers);
+  const auto flagged = [&](const auto& sample) -> const Flags& {
+    used_.assign(flows.size(), 0);
+    for (const std::size_t i : sample) used_[i] = 1;
+    return used_;
+  };
 
   if (!metric) {
     if (!search_needed) return;
@@ -165,17 +181,9 @@ void FlowCheck::find_into(const std::vector<Flow>& flows, const MotionGuess& gue
     if (!guess.rotation_known) {
       search<5>(
           problem, all, random_,
-          [&](const std::array<std::size_t, 5>& s) {
-            used_.assign(flows.size(), 0);
-            for (const std::size_t i : s) used_[i] = 1;
-            return refine_turn(flows, used_, guess.motion, kSteps);
-          },
+          [&](const std::array<std::size_t, 5>& s) { return refine_turn(flows, flagged(s), guess.motion, kSteps); },
           best, trial_);
-      if (const auto refined = refine_turn(flows, best.flags, best.motion, kRefinements)) {
-        problem.classify(*refined, trial_);
-        if (count(trial_) >= best.inliers) best.flags.swap(trial_);
-      }
-      return;
+      return prefer(problem, refine_turn(flows, best.flags, best.motion, kRefinements), best, trial_);
     }
     search<2>(
         problem, all, random_,
@@ -201,24 +209,13 @@ void FlowCheck::find_into(const std::vector<Flow>& flows, const MotionGuess& gue
   } else if (search_needed) {
     search<3>(
         problem, with_depth, random_,
-        [&](const std::array<std::size_t, 3>& s) -> std::optional<Transfer> {
-          used_.assign(flows.size(), 0);
-          for (const std::size_t i : s) used_[i] = 1;
-          return refine_motion(flows, used_, guess.motion, kSteps, settled);
+        [&](const std::array<std::size_t, 3>& s) {
+          return refine_motion(flows, flagged(s), guess.motion, kSteps, settled);
         },
         best, trial_);
   }
   // Gyroscope and prediction are not perfect: let the inliers correct them, then decide.
-  const std::optional<Transfer> refined = refine_motion(flows, best.flags, best.motion, kRefinements, settled);
-  if (refined) {
-    problem.classify(*refined, trial_);
-    const std::size_t inliers = count(trial_);
-    if (inliers >= best.inliers) {
-      best.motion = *refined;
-      best.flags.swap(trial_);
-      best.inliers = inliers;
-    }
-  }
+  prefer(problem, refine_motion(flows, best.flags, best.motion, kRefinements, settled), best, trial_);
   if (best.inliers < kMinFlows) return flags.assign(flows.size(), 0);
   result_.motion = best.motion;
   result_.metric = best.inliers >= kMinDepths && 2 * best.inliers > flows.size();

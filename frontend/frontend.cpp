@@ -348,20 +348,17 @@ void Frontend::Impl::find_depths() {
   usual_inverse_depth_ = 0.0;
   if (!motion_.translation_known || tracks_.empty()) return;
   const Transfer& motion = motion_.motion;
-  const double prior = std::pow(1.0 / (lens_.focal_px() * kInverseDepthChange), 2);  // against a pixel
+  const double weight = std::pow(1.0 / (lens_.focal_px() * kInverseDepthChange), 2);  // against a pixel
   inverse_depths_.clear();
   for (std::size_t i = 0; i < tracks_.size(); ++i) {
     Track& track = tracks_[i];
     const Track& before = previous_[i];
     if (!track.has_depth) {
-      const Eigen::Vector3d far = motion.R_10 * before.left_ray.homogeneous();
-      const Eigen::Vector2d moved = track.left_ray * far.z() - far.head<2>();
-      const Eigen::Vector2d per_inverse_depth = motion.p_10.head<2>() - track.left_ray * motion.p_10.z();
-      const double thought = before.surface.inverse_depth(before.left_ray);
-      const double inverse_depth =
-          std::max(0.0, (per_inverse_depth.dot(moved) + prior * thought) / (per_inverse_depth.squaredNorm() + prior));
-      const Eigen::Vector3d point = motion.scaled_point(before.left_ray, inverse_depth);
-      track.surface = SurfacePatch::through(track.left_ray, point.z() > 0.0 ? inverse_depth / point.z() : 0.0);
+      const DepthPrior thought{before.surface.inverse_depth(before.left_ray), weight};
+      const auto point = intersect(motion, before.left_ray, track.left_ray, thought);
+      const double inverse_depth = point ? std::max(0.0, point->inverse_depth) : 0.0;
+      const double ratio = motion.scaled_point(before.left_ray, inverse_depth).z();
+      track.surface = SurfacePatch::through(track.left_ray, ratio > 0.0 ? inverse_depth / ratio : 0.0);
     }
     inverse_depths_.push_back(track.surface.inverse_depth(track.left_ray));
   }

@@ -25,16 +25,24 @@ struct StereoPoint {
   double epipolar_distance = 0.0;  ///< distance of the right ray from the epipolar line, normalized coordinates
 };
 
-/// The inverse depth that brings `x0` closest to `x1`; nothing if the pair of rays shows no depth.
+/// What is thought of an inverse depth before [1/m]; `weight`: of that in the sum of squares, where the error in
+/// normalized coordinates counts once.
+struct DepthPrior {
+  double inverse_depth = 0.0;
+  double weight = 0.0;
+};
+
+/// The inverse depth that brings `x0` closest to `x1`; nothing if the pair of rays shows no depth and nothing is
+/// thought of it before.
 [[nodiscard]] inline std::optional<StereoPoint> intersect(const Transfer& stereo, const Eigen::Vector2d& x0,
-                                                          const Eigen::Vector2d& x1) {
+                                                          const Eigen::Vector2d& x1, const DepthPrior& prior = {}) {
   // (R x0 + rho p).xy - x1 (R x0 + rho p).z = 0 is linear in rho: two equations, one unknown.
   const Eigen::Vector3d far = stereo.R_10 * x0.homogeneous();
   const Eigen::Vector2d offset = far.head<2>() - x1 * far.z();
   const Eigen::Vector2d slope = stereo.p_10.head<2>() - x1 * stereo.p_10.z();
-  const double slope2 = slope.squaredNorm();
-  if (!(slope2 > 1e-12)) return std::nullopt;
-  const double inverse_depth = -slope.dot(offset) / slope2;
+  const double information = slope.squaredNorm() + prior.weight;
+  if (!(information > 1e-12)) return std::nullopt;
+  const double inverse_depth = (prior.weight * prior.inverse_depth - slope.dot(offset)) / information;
   const double z = far.z() + inverse_depth * stereo.p_10.z();
   if (!(z > 1e-6)) return std::nullopt;
   return StereoPoint{inverse_depth, (offset + inverse_depth * slope).norm() / z};
