@@ -23,11 +23,11 @@ if(EAR_QUICK_BUILD)
   target_precompile_headers(ear_precompiled PRIVATE ${EAR_COMMON_HEADERS})
 endif()
 
-# Programs and tests are many, and each holds all libraries: gold links one in a tenth of the time.
+# Programs and tests are many, and each holds all libraries: lld links one in a tenth of the time.
 if(EAR_QUICK_BUILD AND NOT CMAKE_CROSSCOMPILING)
-  find_program(EAR_GOLD ld.gold)
-  if(EAR_GOLD)
-    add_link_options(-fuse-ld=gold)
+  find_program(EAR_LLD ld.lld)
+  if(EAR_LLD)
+    add_link_options(-fuse-ld=lld)
   endif()
 endif()
 

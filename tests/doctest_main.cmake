@@ -12,8 +12,9 @@ if(EAR_QUICK_BUILD)
   target_precompile_headers(ear_precompiled_tests PRIVATE ${EAR_COMMON_HEADERS})
 endif()
 
-# What `tools/test --asan` builds and runs: the unit tests of these folders, their ctest label is `sanitized` too. Those of
-# smoother and evaluation, which no vehicle runs, take another seven minutes.
+# What `tools/test --asan` builds and runs: the unit tests of these folders, their ctest label is `sanitized` too. Not those
+# labelled accuracy: for a figure of simulated drives they run over and over the code that the others have run. And not
+# those of smoother and evaluation, which no vehicle runs.
 set(EAR_SANITIZED_FOLDERS ear filter frontend recording ros2 rosbag2 odometry view fuzz CACHE STRING "For EAR_SANITIZE")
 add_custom_target(sanitized_tests)
 
@@ -30,7 +31,7 @@ function(ear_register target name label timeout)
   set_tests_properties(${name} PROPERTIES LABELS "${label}" TIMEOUT ${timeout})
 endfunction()
 
-# ear_test(NAME name SOURCES a.cpp ... LIBRARIES target ... [LABEL unit|consistency|replay|bench] [TIMEOUT s]
+# ear_test(NAME name SOURCES a.cpp ... LIBRARIES target ... [LABEL unit|accuracy|consistency|replay|bench] [TIMEOUT s]
 #          [ARGUMENTS of the program ...])
 # builds one doctest program and gives it to ctest: a test source cannot be built and forgotten.
 function(ear_test)

@@ -4,7 +4,12 @@
 #include <cerrno>
 #include <cstddef>
 
-#if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+#ifdef __has_feature  // clang; g++ has macros for them
+#define EAR_SANITIZED_BY_CLANG (__has_feature(address_sanitizer) || __has_feature(thread_sanitizer))
+#else
+#define EAR_SANITIZED_BY_CLANG 0
+#endif
+#if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__) && !EAR_SANITIZED_BY_CLANG
 #define EAR_COUNTS_ALLOCATIONS 1
 #else
 #define EAR_COUNTS_ALLOCATIONS 0

@@ -6,6 +6,10 @@
 
 namespace ear {
 
+Eigen::Matrix3d ImuMotion::by_state(const Covariance& P) const {
+  return H * P.matrix().topLeftCorner<err::imu_size, err::imu_size>() * H.transpose();
+}
+
 /// With positions counted from i on, p_BiBj = R_i^T p_j. By the invariant error, p_j moves by rho_j - [p_j]x theta_j,
 /// and R_i^T turns against theta_i.
 ImuMotion imu_motion(const ImuState& x, const ImuBuffer& samples, TimeNs to_ns, const ImuCalibration& imu) {

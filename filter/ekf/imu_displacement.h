@@ -20,9 +20,7 @@ struct ImuMotion {
   double turn_variance = 0.0;                            ///< of R, one axis, by the same [rad^2]
 
   /// Covariance of p by the error at i, whose covariance is `P` [m^2].
-  [[nodiscard]] Eigen::Matrix3d by_state(const Covariance& P) const {
-    return H * P.matrix().topLeftCorner<err::imu_size, err::imu_size>() * H.transpose();
-  }
+  [[nodiscard]] Eigen::Matrix3d by_state(const Covariance& P) const;
 };
 
 /// Integrates the samples from x.t_ns to `to_ns`.

@@ -33,6 +33,17 @@ StartFit::StartFit(const Vector& prior_sigma, const Vector& x) {
   b_ = -prior_information_.cwiseProduct(x);
 }
 
+void StartFit::add(const Rows& H, const Eigen::Vector3d& z, double variance) {
+  add(H.transpose() * H / variance, H.transpose() * z / variance);
+  cost_ += z.squaredNorm() / variance;
+  rows_ += 3.0;
+}
+
+bool StartFit::expected(const Vector& x, double sigmas) const {
+  const Vector squares = x.array().square() * prior_information_.array();
+  return squares.head<lens_of(0)>().maxCoeff() <= sigmas * sigmas;
+}
+
 StartFit::Matrix StartFit::information(const Vector& x) const {
   const Eigen::Vector3d along = x.segment<3>(gravity).normalized() / kSizeSigma;
   Matrix A = A_;

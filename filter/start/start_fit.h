@@ -36,11 +36,7 @@ class StartFit {
   /// Biases and calibration are zero, to within `prior_sigma`. `x`: where what is added is linearized.
   explicit StartFit(const Vector& prior_sigma, const Vector& x = Vector::Zero());
   /// z = H x + n; `variance` of each n.
-  void add(const Rows& H, const Eigen::Vector3d& z, double variance) {
-    add(H.transpose() * H / variance, H.transpose() * z / variance);
-    cost_ += z.squaredNorm() / variance;
-    rows_ += 3.0;
-  }
+  void add(const Rows& H, const Eigen::Vector3d& z, double variance);
   /// Normal equations A x = b.
   void add(const Matrix& A, const Vector& b) {
     A_ += A;
@@ -57,10 +53,7 @@ class StartFit {
   [[nodiscard]] Matrix information(const Vector& x) const;
   [[nodiscard]] MotionMatrix motion_information(const Vector& x) const;
   /// Are biases and calibration, but for the lenses, within so many standard deviations of the prior?
-  [[nodiscard]] bool expected(const Vector& x, double sigmas) const {
-    const Vector squares = x.array().square() * prior_information_.array();
-    return squares.head<lens_of(0)>().maxCoeff() <= sigmas * sigmas;
-  }
+  [[nodiscard]] bool expected(const Vector& x, double sigmas) const;
 
  private:
   [[nodiscard]] Vector step(const Vector& x, const Vector& b) const;

@@ -40,9 +40,10 @@ class SensorFile {
   }
 
   template <typename Values>
-  void list(const std::string& key, const Values& values, std::size_t count, const std::string& comment = "") {
+  void list(const std::string& key, const Values& values, int count, const std::string& comment = "") {
     file_ << key << ": [";
-    for (std::size_t i = 0; i < count; ++i) file_ << (i > 0 ? ", " : "") << values[i];
+    auto value = values.begin();
+    for (int i = 0; i < count; ++i) file_ << (i > 0 ? ", " : "") << *value++;
     file_ << ']' << (comment.empty() ? "" : "  # " + comment) << '\n';
   }
 

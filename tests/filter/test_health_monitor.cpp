@@ -484,7 +484,7 @@ TEST_CASE("health: without cameras too, the estimate is lost when nothing but in
 }
 
 TEST_CASE("health: without cameras a lost state is none where the wheels do not fit") {
-  for (const std::size_t cameras : {0, 2}) {
+  for (const std::size_t cameras : {0U, 2U}) {
     Calibration calibration = vehicle();
     calibration.cameras.resize(cameras);
     Drive drive;

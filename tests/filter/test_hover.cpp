@@ -158,7 +158,7 @@ Learned hover(double turns_at, double duration, std::uint64_t seed) {
 
 TEST_CASE("hover: a gyroscope that is shaken stays as exact as it was") {
   const PriorConfig prior;
-  for (const std::uint64_t seed : {1, 3}) {
+  for (const std::uint64_t seed : {1U, 3U}) {
     CAPTURE(seed);
     const Learned learned = hover(1e9, 40.0, seed);
     CHECK(learned.scale < 0.2 * prior.gyro_scale);

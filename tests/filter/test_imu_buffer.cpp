@@ -94,7 +94,7 @@ TEST_CASE("imu buffer: the density of white noise, whatever the rate and the dri
 
 TEST_CASE("imu buffer: a piece has the larger noise of the samples at its ends; the mean rate has the largest") {
   ImuBuffer buffer = ramp(100, 11);
-  for (const std::size_t age : {0, 1}) buffer.entry(age).noise = {5.0, 7.0};  // at 0.1 and 0.09 s
+  for (const std::size_t age : {0U, 1U}) buffer.entry(age).noise = {5.0, 7.0};  // at 0.1 and 0.09 s
   const auto factor = [&](TimeNs from, TimeNs to) {
     double largest = 0.0;
     buffer.for_each_piece(from, to,

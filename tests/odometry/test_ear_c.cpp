@@ -272,7 +272,7 @@ TEST_CASE("C interface: before the start the health says so, and after a gap whi
 TEST_CASE("C interface: a consumer that is behind, and one after a reset, miss nothing") {
   const std::vector<Estimate> expected = drive().direct();
   const Handle odometry = make();
-  for (const std::size_t interval : {1, 200}) {  // 200 samples: half a second, three frames
+  for (const std::size_t interval : {1U, 200U}) {  // 200 samples: half a second, three frames
     const std::vector<ear_estimate> estimates = run(odometry.get(), interval);
     REQUIRE(estimates.size() == expected.size());
     CHECK((position(estimates.back()) - expected.back().state.p_WB).norm() < 1e-3);

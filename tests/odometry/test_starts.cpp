@@ -12,7 +12,6 @@
 #include "filter/filter.h"
 #include "src/health_text.h"
 #include "tests/support/about.h"
-#include "tests/support/workload.h"
 #include "tools/experiments/replay_simulation.h"
 #include "tools/simulator/simulation.h"
 
@@ -183,8 +182,7 @@ constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 }  // namespace
 
-TEST_CASE("start given: one camera that flies, without wheels, in the world of the start" *
-          doctest::skip(kStatistics)) {
+TEST_CASE("start given: one camera that flies, without wheels, in the world of the start") {
   std::vector<double> nees;
   for (std::uint64_t seed = 911; seed < 917; ++seed) {
     CAPTURE(seed);
@@ -352,8 +350,7 @@ TEST_CASE("start: why there is none, in words") {
 }
 
 TEST_CASE(
-    "start: one camera with wheels, standing and rolling, with slow, irregular and coarse encoders and a slow IMU" *
-    doctest::skip(kStatistics)) {
+    "start: one camera with wheels, standing and rolling, with slow, irregular and coarse encoders and a slow IMU") {
   struct Sensors {
     const char* name;
     std::size_t encoder_every;
@@ -434,7 +431,7 @@ TEST_CASE("start: a state that wheels contradict, where there is no camera, begi
   CHECK(pushed.reason == Reason::none);
 }
 
-TEST_CASE("start: wheels at 10 Hz alone, standing for two minutes" * doctest::skip(kStatistics)) {
+TEST_CASE("start: wheels at 10 Hz alone, standing for two minutes") {
   const simulator::Simulation simulation = simulate("static", 941, 120.0);
   for (const std::int64_t coarse : {1, 512}) {
     Vehicle vehicle;

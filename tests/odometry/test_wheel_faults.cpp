@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "tests/support/simulated_run.h"
-#include "tests/support/workload.h"
 
 using namespace ear;
 
@@ -59,8 +58,8 @@ TEST_CASE(
     Outcome clean;
   };
   std::vector<Drive> drives;
-  for (const std::string& sequence : test::workload<std::string>({"flat1", "wave1"})) {
-    for (const std::uint64_t seed : test::workload<std::uint64_t>({821, 822, 823}))
+  for (const char* sequence : {"flat1", "wave1"}) {
+    for (const std::uint64_t seed : {821U, 822U, 823U})
       drives.push_back({sequence, seed, run(sequence, seed, "")});
   }
   const double root = std::sqrt(static_cast<double>(drives.size()));

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "tests/support/simulated_run.h"
-#include "tests/support/workload.h"
 #include "tools/evaluation/alignment.h"
 #include "tools/experiments/sample_feed.h"
 
@@ -87,8 +86,8 @@ double median(std::vector<double> values) {
 // many, by the scatter from seed to seed.
 
 // 16 seeds: 0.55 to 1.16 times the error without, median 0.88; 14.3 mm, standard deviation 3.0 mm.
-TEST_CASE("wheels and lasers: on waves, the median error of five drives is no larger than without, the slope is known" *
-          doctest::skip(test::kStatistics)) {
+TEST_CASE(
+    "wheels and lasers: on waves, the median error of five drives is no larger than without, the slope is known") {
   std::vector<double> positions;
   std::vector<double> ratios;
   for (std::uint64_t seed = 811; seed < 816; ++seed) {
@@ -106,8 +105,7 @@ TEST_CASE("wheels and lasers: on waves, the median error of five drives is no la
 }
 
 // Seeds 812 to 814: 0.33 to 0.78 times the error of the others, whose rows are scored too.
-TEST_CASE("wheels and lasers: on a lawn, the terrain's model has less error than the others, median of three drives" *
-          doctest::skip(test::kStatistics)) {
+TEST_CASE("wheels and lasers: on a lawn, the terrain's model has less error than the others, median of three drives") {
   std::vector<double> to_gyro;
   std::vector<double> to_differential;
   for (std::uint64_t seed = 812; seed < 815; ++seed) {
@@ -140,7 +138,7 @@ TEST_CASE("wheels and lasers: with the lens covered from the beginning they star
 }
 
 // 10 seeds: 17.6 mm, standard deviation 2.9 mm; 1.09 to 2.04 times the error without the gap, 1.4 on average.
-TEST_CASE("wheels and lasers: five seconds without a frame are bridged at 20 Hz" * doctest::skip(test::kStatistics)) {
+TEST_CASE("wheels and lasers: five seconds without a frame are bridged at 20 Hz") {
   std::vector<double> positions;
   std::vector<double> ratios;
   for (std::uint64_t seed = 819; seed < 822; ++seed) {
@@ -162,8 +160,7 @@ TEST_CASE("wheels and lasers: five seconds without a frame are bridged at 20 Hz"
 }
 
 // 10 seeds: 13.5 mm, standard deviation 2.6 mm, against 10.3 mm, standard deviation 1.9 mm, at 30 frames a second.
-TEST_CASE("wheels and lasers: at five frames a second the median error of five drives is less than twice that at 30" *
-          doctest::skip(test::kStatistics)) {
+TEST_CASE("wheels and lasers: at five frames a second the median error of five drives is less than twice that at 30") {
   std::vector<double> fast;
   std::vector<double> slow;
   for (std::uint64_t seed = 820; seed < 825; ++seed) {

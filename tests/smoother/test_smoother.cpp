@@ -8,7 +8,6 @@
 #include "smoother/minimum.h"
 #include "smoother/smoother.h"
 #include "tests/support/simulated_run.h"
-#include "tests/support/workload.h"
 #include "tools/simulator/simulation.h"
 
 using namespace ear;
@@ -53,7 +52,7 @@ Errors run(const simulator::Simulation& simulation, OdometerModel model = Odomet
 }  // namespace
 
 TEST_CASE("smoother: drives on flat ground and over waves") {
-  for (const char* sequence : ear::test::workload<const char*>({"flat1", "wave1"})) {
+  for (const char* sequence : {"flat1", "wave1"}) {
     CAPTURE(std::string(sequence));
     const Errors errors = run(simulate(sequence, 15.0));
     CHECK(errors.estimates > 400);
@@ -62,20 +61,19 @@ TEST_CASE("smoother: drives on flat ground and over waves") {
   }
 }
 
-TEST_CASE("smoother: takes off, flies, and lands" * doctest::skip(ear::test::kLong)) {
+TEST_CASE("smoother: takes off, flies, and lands") {
   const Errors errors = run(simulate("fly1", 30.0));
   CHECK(errors.estimates > 820);
   CHECK(errors.rmse < 0.06);
   CHECK(errors.largest < 0.12);
 }
 
-TEST_CASE("smoother: without wheels, from cameras and inertial samples" * doctest::skip(ear::test::kLong)) {
+TEST_CASE("smoother: without wheels, from cameras and inertial samples") {
   const Errors errors = run(simulate("flat1", 15.0), OdometerModel::none);
   CHECK(errors.rmse < 0.06);
 }
 
-TEST_CASE("smoother: health names a beam that is wrong, and no other sensor, while the estimate goes on" *
-          doctest::skip(ear::test::kLong)) {
+TEST_CASE("smoother: health names a beam that is wrong, and no other sensor, while the estimate goes on") {
   const simulator::Simulation simulation = simulate("flat1", 11.0, "laser_biased.front_left@6+4=0.1");
   Smoother smoother(FilterConfig{}, simulation.calibration());
   std::size_t named = 0, others = 0;

@@ -154,7 +154,8 @@ TEST_CASE("server: what is malformed, unknown, too large or would change somethi
       {get("/", "X-Large: " + std::string(40'000, 'x') + "\r\n"), 400},
   };
   for (const auto& [request, status] : requests) {
-    CAPTURE(request.substr(0, 60));
+    const std::string first = request.substr(0, 60);
+    CAPTURE(first);
     const std::uint64_t before = served.server.counts().refused;
     const std::string answer = ask(served.port(), request);
     CHECK(status_of(answer) == status);
