@@ -18,7 +18,7 @@ namespace ear {
 struct RelativeMotion {
   Eigen::Matrix3d R_B1B0 = Eigen::Matrix3d::Identity();
   Eigen::Vector3d p_B0B1 = Eigen::Vector3d::Zero();  ///< [m]
-  bool rotation_known = false;  ///< without what the gyroscope's bias turns; before a start that is not known
+  bool rotation_known = false;  ///< false before a start: the turn holds what the gyroscope's bias adds
   bool translation_known = false;
 };
 

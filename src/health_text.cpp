@@ -32,18 +32,18 @@ const char* to_text(Reason reason) {
     case Reason::other_gravity:
       return "it stands, but the mean specific force is not gravity: another unit, or a broken accelerometer";
     case Reason::moves_unseen:
-      return "it moves, and nothing shows how far: no wheels on the ground, no two cameras, no change of speed with "
-             "one";
+      return "it does not stand still, and nothing shows how far: no wheels on the ground, no two cameras, no change "
+             "of speed with one";
     case Reason::few_readings:
-      return "it rolls, and the readings of the wheels do not span 1.5 s yet";
+      return "it does not stand still, and the readings of the wheels do not span 1.5 s yet";
     case Reason::wheel_gaps:
-      return "it rolls, and readings of the wheels are missing, or too far apart";
+      return "it does not stand still, and readings of the wheels are missing, or too far apart";
     case Reason::wheels_contradict:
-      return "it rolls, and wheels and inertial samples show different motions";
+      return "it does not stand still, and wheels and inertial samples show different motions";
     case Reason::few_frames:
-      return "it moves, and frames whose features fit each other do not span 1.5 s yet";
+      return "it does not stand still, and frames whose features fit each other do not span 1.5 s yet";
     case Reason::cameras_contradict:
-      return "it moves, and cameras and inertial samples show different motions";
+      return "it does not stand still, and cameras and inertial samples show different motions";
     case Reason::start_is_ahead:
       return "the time of the start that was given has not come";
     case Reason::start_is_past:

@@ -25,15 +25,18 @@ enum class Reason : std::uint8_t {
   no_frame,       ///< neither an image came nor a step was asked for, that inertial samples reach
   few_samples,    ///< inertial samples are missing
   other_gravity,  ///< it stands, but the mean specific force is not gravity: another unit, or a broken sensor
-  moves_unseen,   ///< it moves, and nothing shows how far: see docs/health.md
-  few_readings,   ///< it rolls: the wheels' readings do not yet span the time that a start takes
-  wheel_gaps,     ///< it rolls: readings of the wheels are missing, or more than 0.5 s apart (0.25 s where counts wrap)
-  wheels_contradict,   ///< it rolls: wheels and inertial samples show different motions, as with slip
-  few_frames,          ///< it moves: the frames whose features fit each other do not yet span the time for a start
-  cameras_contradict,  ///< it moves: cameras and inertial samples show different motions
-  start_is_ahead,      ///< the time of the start that was given is not yet there
-  start_is_past,       ///< the inertial samples do not reach back to the start that was given
-  vague_velocity,      ///< there is a state, whose velocity is not known well enough yet
+  // It does not stand still, and
+  moves_unseen,        ///< nothing shows how far it moves: see docs/health.md
+  few_readings,        ///< the wheels' readings do not yet span the time that a start takes
+  wheel_gaps,          ///< the wheels' readings are missing, or more than 0.5 s apart (0.25 s where counts wrap)
+  wheels_contradict,   ///< wheels and inertial samples show different motions, as with slip
+  few_frames,          ///< the frames whose features fit each other do not yet span the time for a start
+  cameras_contradict,  ///< cameras and inertial samples show different motions
+  // One was given, and
+  start_is_ahead,  ///< its time is not yet there
+  start_is_past,   ///< the inertial samples do not reach back to it
+  // Neither.
+  vague_velocity,  ///< there is a state, whose velocity is not known well enough yet
   // How it was lost.
   inertia_alone,      ///< nothing but inertial samples for two seconds
   velocity_lost,      ///< the velocity's standard deviation is too large

@@ -11,6 +11,7 @@
 #include <stdexcept>
 
 #include "scene.h"
+#include "tests/support/workload.h"
 
 namespace ear {
 namespace {
@@ -364,7 +365,8 @@ Count features_in(const Darkness& darkness) {
 
 }  // namespace
 
-TEST_CASE("front end: noise gives no features in the dark, and leaves those of a dim scene") {
+TEST_CASE("front end: noise gives no features in the dark, and leaves those of a dim scene" *
+          doctest::skip(test::kStatistics)) {
   struct Case {
     double sigma;  // of what changes from image to image [grey values]
     Noise fixed;
