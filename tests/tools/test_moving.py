@@ -108,7 +108,7 @@ class Clip(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             result = self.run_program("run", recording, "--mono", "--out", Path(folder) / "output")
         self.assertNotEqual(result.returncode, 0)
-        self.assertIn("cannot start yet: it moves", result.stderr)
+        self.assertIn("cannot start yet: it does not stand still", result.stderr)
 
     def test_one_camera_starts_where_it_is_told(self):
         """From a pose and velocity of the truth, without its biases. The estimate is then in the truth's world."""
