@@ -23,8 +23,10 @@ if(EAR_QUICK_BUILD)
   target_precompile_headers(ear_precompiled PRIVATE ${EAR_COMMON_HEADERS})
 endif()
 
-# Programs and tests are many, and each holds all libraries: lld links one in a tenth of the time.
-if(EAR_QUICK_BUILD AND NOT CMAKE_CROSSCOMPILING)
+# Programs and tests are many, and each holds all libraries: lld links one in a tenth of the time. It cannot read what g++
+# leaves for optimisation at link time.
+if(EAR_QUICK_BUILD AND PROJECT_IS_TOP_LEVEL AND NOT CMAKE_CROSSCOMPILING AND NOT CMAKE_INTERPROCEDURAL_OPTIMIZATION
+   AND NOT CMAKE_CXX_FLAGS MATCHES "-flto")
   find_program(EAR_LLD ld.lld)
   if(EAR_LLD)
     add_link_options(-fuse-ld=lld)
