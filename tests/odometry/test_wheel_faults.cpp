@@ -59,8 +59,7 @@ TEST_CASE(
   };
   std::vector<Drive> drives;
   for (const char* sequence : {"flat1", "wave1"}) {
-    for (const std::uint64_t seed : {821U, 822U, 823U})
-      drives.push_back({sequence, seed, run(sequence, seed, "")});
+    for (const std::uint64_t seed : {821U, 822U, 823U}) drives.push_back({sequence, seed, run(sequence, seed, "")});
   }
   const double root = std::sqrt(static_cast<double>(drives.size()));
   for (const std::string fault : {"wheel_lifted.left@10+5", "wheel_lifted.right@10+5", "encoder_frozen.both@10+5",
