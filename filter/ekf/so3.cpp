@@ -47,6 +47,7 @@ Eigen::Vector3d log_so3(const Eigen::Matrix3d& R) {
 
 template <int m>
 Eigen::Matrix3d gamma_derivative(const Eigen::Vector3d& phi, const Eigen::Vector3d& a) {
+  static_assert(m == 1 || m == 2);
   const Eigen::Matrix3d S = skew(phi);
   double factorial = m == 2 ? 2.0 : 1.0;  // (k + m)! at k = 0
   Eigen::Vector3d u = a;
@@ -61,7 +62,6 @@ Eigen::Matrix3d gamma_derivative(const Eigen::Vector3d& phi, const Eigen::Vector
   return sum;
 }
 
-template Eigen::Matrix3d gamma_derivative<0>(const Eigen::Vector3d& phi, const Eigen::Vector3d& a);
 template Eigen::Matrix3d gamma_derivative<1>(const Eigen::Vector3d& phi, const Eigen::Vector3d& a);
 template Eigen::Matrix3d gamma_derivative<2>(const Eigen::Vector3d& phi, const Eigen::Vector3d& a);
 

@@ -25,7 +25,7 @@ template <int m>
 [[nodiscard]] Eigen::Vector3d log_so3(const Eigen::Matrix3d& R);
 
 /// Derivative of Gamma_m(phi) * a with respect to phi, by the series: u_k = phi x u_{k-1}, u_0 = a.
-/// Seven terms: below 1e-12 for the turn between two IMU samples (less than 0.1 rad).
+/// `m` is 1 or 2. Seven terms: below 1e-12 for the turn between two IMU samples (less than 0.1 rad).
 template <int m>
 [[nodiscard]] Eigen::Matrix3d gamma_derivative(const Eigen::Vector3d& phi, const Eigen::Vector3d& a);
 

@@ -32,11 +32,11 @@ enum class Reason : std::uint8_t {
   wheels_contradict,   ///< wheels and inertial samples show different motions, as with slip
   few_frames,          ///< the frames whose features fit each other do not yet span the time for a start
   cameras_contradict,  ///< cameras and inertial samples show different motions
-  // One was given, and
+  // A start was given, and
   start_is_ahead,  ///< its time is not yet there
   start_is_past,   ///< the inertial samples do not reach back to it
-  // Neither.
-  vague_velocity,  ///< there is a state, whose velocity is not known well enough yet
+  // It has started, and
+  vague_velocity,  ///< the velocity is not known well enough yet
   // How it was lost.
   inertia_alone,      ///< nothing but inertial samples for two seconds
   velocity_lost,      ///< the velocity's standard deviation is too large

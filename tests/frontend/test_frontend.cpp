@@ -11,7 +11,6 @@
 #include <stdexcept>
 
 #include "scene.h"
-#include "tests/support/workload.h"
 
 namespace ear {
 namespace {
@@ -365,8 +364,7 @@ Count features_in(const Darkness& darkness) {
 
 }  // namespace
 
-TEST_CASE("front end: noise gives no features in the dark, and leaves those of a dim scene" *
-          doctest::skip(test::kStatistics)) {
+TEST_CASE("front end: noise gives no features in the dark, and leaves those of a dim scene") {
   struct Case {
     double sigma;  // of what changes from image to image [grey values]
     Noise fixed;
