@@ -240,7 +240,8 @@ TEST_CASE("wheels and lasers: a recording that begins in motion starts rolling, 
 TEST_CASE("wheels and lasers: spikes of the IMU cost centimetres, clipped jolts decimetres, neither the track") {
   const std::array<std::pair<const char*, double>, 2> faults = {{{"imu_spikes@10", 0.1}, {"imu_saturated@10", 0.5}}};
   for (const auto& [fault, largest] : faults) {
-    CAPTURE(std::string(fault));
+    const std::string name = fault;
+    CAPTURE(name);
     simulator::Options options;
     options.sequence = "flat1";
     options.seed = 818;
