@@ -100,7 +100,11 @@ void CommonEstimator::add_encoder(const EncoderSample& given) {
   if (taken.verdict != Verdict::accepted || !taken.increment) return;
   note(sources_.watch_contact(*taken.increment, ekf_));
   sources_.standstill().add(*taken.increment);
-  if (const auto due_ns = ingest_.push(*taken.increment, ekf_.running())) make_room(*due_ns);
+  if (!ekf_.running() && sources_.flies_at(taken.increment->from_ns)) {
+    ingest_.drop_readings();  // a start takes those that wait for wheels that roll
+  } else if (const auto due_ns = ingest_.push(*taken.increment, ekf_.running())) {
+    make_room(*due_ns);
+  }
 }
 
 void CommonEstimator::add_laser(const LaserSample& given) {

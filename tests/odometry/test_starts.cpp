@@ -311,6 +311,30 @@ TEST_CASE("start: one camera in flight, with a calibration as wrong as real ones
   CHECK(nees_rotation / runs < 9.0);
 }
 
+TEST_CASE("start: in the air, just before the wheels touch the ground, which they and the beams then show") {
+  const simulator::Simulation simulation = simulate("fly1", 954, 60.0);
+  double landed = 0.0;  // [s] after the first frame
+  bool flew = false;
+  const auto mode_at = [&](double t) {
+    return simulation.truth(simulation.frame_times().front() + static_cast<TimeNs>(1e9 * t)).mode;
+  };
+  for (; landed < 59.0 && !(flew && mode_at(landed) == simulator::Mode::ground); landed += 0.02) {
+    flew = flew || mode_at(landed) == simulator::Mode::air;
+  }
+  REQUIRE(landed > 5.0);
+  REQUIRE(landed < 55.0);
+  for (double before = 1.7; before > 0.0; before -= 0.1) {
+    CAPTURE(before);
+    Vehicle vehicle;
+    vehicle.from = landed - before;
+    const Outcome outcome = run(simulation, vehicle);
+    CHECK(outcome.first < 4.0);
+    CHECK(outcome.lost == 0);
+    CHECK(outcome.position_rmse < 0.05);
+    CHECK(outcome.nees_position < 10.0);
+  }
+}
+
 TEST_CASE("start: why there is none, in words") {
   const simulator::Simulation simulation = simulate("flat1", 923, 12.0);
   Vehicle vehicle;

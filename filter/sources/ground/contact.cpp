@@ -122,7 +122,7 @@ bool ContactDetector::lasts(bool holds, TimeNs t_ns, double duration) {
 ContactEvent ContactDetector::change(ContactMode mode, TimeNs t_ns) {
   const bool first = mode_ == ContactMode::unknown;
   mode_ = mode;
-  since_ns_ = t_ns;
+  if (!first) since_ns_ = t_ns;
   holds_since_ns_.reset();
   if (mode == ContactMode::ground) {
     level_ = std::clamp(ground_->height(), -config_.touchdown_height, config_.touchdown_height);

@@ -42,7 +42,7 @@ class ContactDetector {
   void set_gyro_bias(const Eigen::Vector3d& b_g) { b_g_ = b_g; }
 
   [[nodiscard]] ContactMode mode() const { return mode_; }
-  /// When the mode began; nothing while it is unknown.
+  /// When the wheels last left the ground or met it; nothing if that was not seen.
   [[nodiscard]] std::optional<TimeNs> since_ns() const { return since_ns_; }
   /// Beams that give the same range again and again.
   [[nodiscard]] std::bitset<kMaxBeams> stuck_beams() const {

@@ -20,14 +20,16 @@ ContactEvent Ground::note(ContactEvent event) {
   return event;
 }
 
-bool Ground::rolls_at(TimeNs t_ns) const {
+bool Ground::carries_at(TimeNs t_ns, double settled) const {
   const std::optional<TimeNs> since_ns = contact_.since_ns();
-  return carries() && (!since_ns || seconds_between(*since_ns, t_ns) > kLanding);
+  return carries() && (!since_ns || seconds_between(*since_ns, t_ns) > settled);
 }
+
+bool Ground::rolls_at(TimeNs t_ns) const { return carries_at(t_ns, kLanding); }
 
 void Ground::update(const BeamRanges& reading, const ImuBuffer& imu, CameraUpdate calibration, Ekf& ekf,
                     Records& records) {
-  if (!lasers_ || !carries()) return;
+  if (!lasers_ || !carries_at(reading.t_ns, 0.0)) return;
   const Eigen::Matrix3d R_WB = motion_at(reading.t_ns, ekf.state().imu, imu).R_WB;
   if (!known() && !restart(reading, R_WB, ekf)) return;
   const State& x = ekf.state();

@@ -30,6 +30,8 @@ class Ground {
 
   /// Do the wheels carry the vehicle?
   [[nodiscard]] bool carries() const { return contact_.mode() == ContactMode::ground; }
+  /// Has it been seen whether they do?
+  [[nodiscard]] bool contact_known() const { return contact_.mode() != ContactMode::unknown; }
   /// Do the wheels show how the vehicle moves? Not in the air, and not while the ground spins them up.
   [[nodiscard]] bool rolls_at(TimeNs t_ns) const;
   /// Have the lasers seen the ground since it was last touched?
@@ -45,6 +47,8 @@ class Ground {
 
  private:
   ContactEvent note(ContactEvent event);
+  /// The same at `t_ns`, and for `settled` seconds before it.
+  [[nodiscard]] bool carries_at(TimeNs t_ns, double settled) const;
   bool restart(const BeamRanges& reading, const Eigen::Matrix3d& R_WB, Ekf& ekf);
   Innovation weigh(GroundRows& z, NoiseScore& score, TimeNs t_ns, const Ekf& ekf) const;
 
