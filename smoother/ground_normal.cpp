@@ -54,7 +54,7 @@ bool GroundNormal::add(const BeamRanges& ranges, const OdometerState& odometer, 
     ++(innovation.fits ? records.statistics.beams_used : records.statistics.beams_rejected);
     used += innovation.fits ? 1 : 0;
   }
-  const AxlePrediction axle = predict_axle(x, I);
+  const LeanPrediction axle = predict_lean(x, I, OdometerAxis::left);
   take(-axle.lean, axle.H_normal, std::sqrt(2.0) * config_.unevenness / odometer.track_width);
 
   const double vague = 1.0 / (config_.normal_prior * config_.normal_prior);

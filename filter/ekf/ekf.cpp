@@ -107,10 +107,7 @@ std::optional<TimeNs> Ekf::propagate(const ImuBuffer& samples, TimeNs t_ns, cons
         if (factors.gyro * calibration_.imu.gyro_noise * std::sqrt(dt) > kUncertainTurn && !uncertain_ns)
           uncertain_ns = state_.imu.t_ns;
         const ErrorTransition step = error_transition(state_.imu, gyro_B, accel_B, dt, noise);
-        // Without a camera turns about the vertical are left out: the heading would follow wheels whose track width is
-        // a guess.
-        const Eigen::Vector3d measured_B = gyro_B - state_.imu.b_g;
-        chain(by_matrix, step, calibration_.cameras.empty() ? tilting(state_.imu.R_WB, measured_B) : measured_B);
+        chain(by_matrix, step, gyro_B - state_.imu.b_g);
         if (total) {
           chain(kernels_, *total, step);
         } else {
@@ -125,6 +122,8 @@ std::optional<TimeNs> Ekf::propagate(const ImuBuffer& samples, TimeNs t_ns, cons
         last_.accel_W = (state_.imu.v_W - before_W) / dt;
       });
   state_.imu.t_ns = t_ns;
+  // Without a camera only what tilts the body counts: the heading would follow wheels whose track width is a guess.
+  if (calibration_.cameras.empty()) leave_out_heading(by_matrix, state_.imu);
   last_.turns = last_.mean_rate_B.norm() > kAboveNoise * usual.gyro * calibration_.imu.gyro_noise;
   const double distance = state_.imu.v_W.norm() * duration;
   covariance_.propagate(total.value_or(ErrorTransition{}), by_matrix, tangent_basis(state_.ground.n_W),
@@ -212,6 +211,8 @@ void Ekf::restart_normal(const Eigen::Vector3d& n_W) {
   const Eigen::Vector2d sigma = Eigen::Vector2d::Constant(normal_prior_);
   covariance_.restart(err::normal, sigma);
 }
+
+void Ekf::inflate_normal(double variance) { covariance_.inflate(err::normal, variance * Eigen::Matrix2d::Identity()); }
 
 BiasChanges Ekf::take_bias_changes() {
   const BiasChanges changes = bias_changes_;

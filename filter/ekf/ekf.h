@@ -89,8 +89,10 @@ class Ekf {
   void inflate_time(double seconds);
   /// The biases may be elsewhere: gyroscope [rad/s], accelerometer [m/s^2].
   void inflate_biases(double gyro, double accel);
-  /// The ground's normal is this one, and as little known as before the lasers saw it.
+  /// The ground's normal is this one, and as little known as before anything showed it.
   void restart_normal(const Eigen::Vector3d& n_W);
+  /// The ground's normal may have turned by this variance [rad^2] besides.
+  void inflate_normal(double variance);
 
   /// Since the last call.
   [[nodiscard]] BiasChanges take_bias_changes();

@@ -119,9 +119,13 @@ void chain(GyroEffect& total, const ErrorTransition& step, const Eigen::Vector3d
   }
 }
 
-Eigen::Vector3d tilting(const Eigen::Matrix3d& R_WB, const Eigen::Vector3d& rate_B) {
-  const Eigen::Vector3d up_B = R_WB.row(2);
-  return rate_B - rate_B.dot(up_B) * up_B;
+/// What turns about the body leaves velocity and position where they are: nu = dv + [v]x theta, rho = dp + [p]x theta.
+void leave_out_heading(GyroEffect& effect, const ImuState& x) {
+  const Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
+  Eigen::Matrix<double, 9, 1> heading;
+  heading << up, x.v_W.cross(up), x.p_WB.cross(up);
+  const Eigen::Matrix<double, 1, 9> turn = effect.row(err::theta + 2);
+  effect.noalias() -= heading * turn;
 }
 
 }  // namespace ear

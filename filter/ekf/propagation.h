@@ -64,11 +64,9 @@ void chain(const FilterKernels& kernels, ErrorTransition& total, const ErrorTran
 /// What errors of the gyroscope's matrix do to (theta, nu, rho).
 using GyroEffect = Eigen::Matrix<double, 9, 9>;
 
-/// `total` followed by `step`, in which the gyroscope measures `measured_B` without its bias [rad/s], or as much of it
-/// as is to count.
+/// `total` followed by `step`, in which the gyroscope measures `measured_B` without its bias [rad/s].
 void chain(GyroEffect& total, const ErrorTransition& step, const Eigen::Vector3d& measured_B);
-
-/// The part of a rate that tilts the body: without what turns it about the vertical.
-[[nodiscard]] Eigen::Vector3d tilting(const Eigen::Matrix3d& R_WB, const Eigen::Vector3d& rate_B);
+/// Without the turn about the vertical that there is in the effect, which has just come to `x`.
+void leave_out_heading(GyroEffect& effect, const ImuState& x);
 
 }  // namespace ear

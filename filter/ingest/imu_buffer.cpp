@@ -69,12 +69,16 @@ ImuStatistics ImuBuffer::statistics(TimeNs from_ns, TimeNs to_ns) const {
   Eigen::Vector3d gyro_squares = Eigen::Vector3d::Zero();
   Eigen::Vector3d accel_squares = Eigen::Vector3d::Zero();
   double gyro_steps = 0.0, accel_steps = 0.0;
+  Eigen::Vector3d gyro_first = Eigen::Vector3d::Zero(), accel_first = Eigen::Vector3d::Zero();  // of the first half
+  const std::size_t middle = begin + (end - begin) / 2;
   const ImuSample& reference = (*this)[begin];  // differences to it keep the sum of squares exact
   for (std::size_t i = begin; i < end; ++i) {
     const Eigen::Vector3d gyro = (*this)[i].gyro_B - reference.gyro_B;
     const Eigen::Vector3d accel = (*this)[i].accel_B - reference.accel_B;
     s.gyro_mean += gyro;
     s.accel_mean += accel;
+    if (i < middle) gyro_first += gyro;
+    if (i < middle) accel_first += accel;
     gyro_squares += gyro.cwiseAbs2();
     accel_squares += accel.cwiseAbs2();
     if (i == begin) continue;
@@ -88,6 +92,11 @@ ImuStatistics ImuBuffer::statistics(TimeNs from_ns, TimeNs to_ns) const {
   s.accel_mean /= n;
   s.gyro_spread = std::sqrt(std::max(0.0, (gyro_squares / n - s.gyro_mean.cwiseAbs2()).maxCoeff()));
   s.accel_spread = std::sqrt(std::max(0.0, (accel_squares / n - s.accel_mean.cwiseAbs2()).maxCoeff()));
+  const auto first = static_cast<double>(middle - begin);
+  if (first > 0.0) {  // the first half is off by as much as the second is to the other side
+    s.gyro_error = (gyro_first / first - s.gyro_mean).cwiseAbs().maxCoeff();
+    s.accel_error = (accel_first / first - s.accel_mean).cwiseAbs().maxCoeff();
+  }
   s.gyro_mean += reference.gyro_B;
   s.accel_mean += reference.accel_B;
   if (s.count < 2) return s;

@@ -25,6 +25,10 @@ struct ImuStatistics {
   Eigen::Vector3d accel_mean = Eigen::Vector3d::Zero();
   double gyro_spread = 0.0;   ///< standard deviation, largest axis [rad/s]
   double accel_spread = 0.0;  ///< [m/s^2]
+  // Standard error of the means, as the first and the second half of the samples show it, largest axis: white noise or
+  // not.
+  double gyro_error = 0.0;   ///< [rad/s]
+  double accel_error = 0.0;  ///< [m/s^2]
   // White noise, by the differences of samples in a row: what changes slowly does not count. Mean of the axes.
   double gyro_density = 0.0;   ///< [rad/s/sqrt(Hz)]
   double accel_density = 0.0;  ///< [m/s^2/sqrt(Hz)]

@@ -16,6 +16,12 @@ constexpr double kGapRate = 0.3;           // [rad/s] chosen: the same
 // A vehicle that stood begins to shake, and the biases of MEMS sensors are others then (vibration rectification).
 constexpr double kShakenGyro = 5e-4;  // [rad/s] measured: 4.7e-4 when the drone of euroc_mh01_mono took off
 
+std::optional<Standstill::GyroBias> gyro_bias(const Ekf& ekf) {
+  if (!ekf.running()) return std::nullopt;
+  return Standstill::GyroBias{ekf.state().imu.b_g,
+                              std::sqrt(ekf.covariance().matrix().diagonal().segment<3>(err::b_g).maxCoeff())};
+}
+
 }  // namespace
 
 Sources::Sources(const FilterConfig& config, const Calibration& calibration)
@@ -38,8 +44,7 @@ void Sources::look_at(const FeatureFrame& frame, TimeNs t_ns, const Ingest& inge
   const bool stood = standstill_.stands();
   cameras_.measure_noise(frame, ekf.state().camera);
   const ImuStatistics recent = standstill_.recent(ingest.imu(), t_ns);
-  const auto b_g = ekf.running() ? std::optional(ekf.state().imu.b_g) : std::nullopt;
-  standstill_.update({frame, t_ns, recent, b_g, on_ground()});
+  standstill_.update({frame, t_ns, recent, gyro_bias(ekf), on_ground()});
   if (standstill_.stands()) imu_score_.add_rest(recent, imu_);
   ground_.set_gyro_bias(ekf.state().imu.b_g);
   if (stood && !standstill_.stands() && ekf.running()) ekf.inflate_biases(kShakenGyro, kShakenAccel);
@@ -81,6 +86,7 @@ void Sources::advance(TimeNs t_ns, const Advice& advice, Ingest& ingest, Ekf& ek
                       {ingest.imu(), ground_.known(), advice.of(MotionSensor::odometer), camera_update_,
                        imu_score_.noise().gyro, standstill_.stands(), standstill_.wheels_rest(z->t_ns)},
                       ekf, records);
+      ground_.stand(*z->increment, ingest.imu(), camera_update_, ekf);
     }
   }
   propagate(t_ns, advice, ingest, ekf);

@@ -162,8 +162,10 @@ std::optional<StartState> Start::standing(TimeNs t_ns, const ImuStatistics& imu)
 
   // force = R^T (-g) + b_a + n, rate = b_g + n; with the invariant error, R^T u = R^^T (u + [u]x theta).
   const double root_duration = std::sqrt(imu.duration);
-  const double accel_sigma = std::hypot(calibration_.imu.accel_noise / root_duration, kShakenAccel);
-  const double gyro_sigma = calibration_.imu.gyro_noise / root_duration;
+  const auto as_shown = [](double stated, double shown) { return shown > kClear * stated ? shown : stated; };
+  const double accel_sigma =
+      as_shown(std::hypot(calibration_.imu.accel_noise / root_duration, kShakenAccel), imu.accel_error);
+  const double gyro_sigma = as_shown(calibration_.imu.gyro_noise / root_duration, imu.gyro_error);
   start.H.setZero(6, err::imu_size);
   start.residual.setZero(6);  // that of the rate stays
   start.H.block<3, 3>(0, err::theta) = x.R_WB.transpose() * skew(-kGravity_W) / accel_sigma;
@@ -217,9 +219,8 @@ Eigen::VectorXd Start::sigma() const {
       sigma.segment<3>(err::stereo + 3) = (by_target.square() + prior.stereo_position * prior.stereo_position).sqrt();
     }
   }
-  // Without a camera nothing shows where the gyroscope's axes point.
-  Eigen::Matrix3d gyro = prior.gyro_unseen * Eigen::Matrix3d::Identity();
-  if (!calibration_.cameras.empty()) gyro.setConstant(prior.gyro_scale);
+  Eigen::Matrix3d gyro = Eigen::Matrix3d::Constant(prior.gyro_scale);
+  if (calibration_.cameras.empty()) gyro.diagonal().setConstant(prior.gyro_unseen);
   sigma.segment<9>(err::gyro_matrix) = gyro.reshaped();
   for (std::size_t i = 0; online.intrinsics && i < calibration_.cameras.size(); ++i) {
     sigma.segment<err::lens_size>(err::lens(static_cast<int>(i))) = lens_sigma(prior, calibration_.cameras[i]);

@@ -48,10 +48,17 @@ TEST_CASE("ground: nose-down brings the ground closer to the front beams") {
 TEST_CASE("ground: the axle of a vehicle that stands on its right wheel leans to the left of the ground") {
   // Rolled about x, the left wheel up: y points up from the floor.
   const State up = on_plane(Eigen::Vector3d::UnitZ(), exp_so3({0.1, 0.0, 0.0}));
-  CHECK(predict_axle(up, up.imu.R_WB).lean == doctest::Approx(std::sin(0.1)));
+  CHECK(predict_lean(up, up.imu.R_WB, OdometerAxis::left).lean == doctest::Approx(std::sin(0.1)));
   // On a floor that rises to the left by as much it stands on both.
   const State along = on_plane({0.0, -std::sin(0.1), std::cos(0.1)}, exp_so3({0.1, 0.0, 0.0}));
-  CHECK(std::abs(predict_axle(along, along.imu.R_WB).lean) < 1e-12);
+  CHECK(std::abs(predict_lean(along, along.imu.R_WB, OdometerAxis::left).lean) < 1e-12);
+}
+
+TEST_CASE("ground: a vehicle whose nose is down leans forward, unless the ground goes down with it") {
+  const State level = on_plane(Eigen::Vector3d::UnitZ(), exp_so3({0.0, 0.1, 0.0}));
+  CHECK(predict_lean(level, level.imu.R_WB, OdometerAxis::forward).lean == doctest::Approx(-std::sin(0.1)));
+  const State downhill = on_plane({std::sin(0.1), 0.0, std::cos(0.1)}, exp_so3({0.0, 0.1, 0.0}));
+  CHECK(std::abs(predict_lean(downhill, downhill.imu.R_WB, OdometerAxis::forward).lean) < 1e-12);
 }
 
 TEST_CASE("ground: the plane through the predicted hits is the plane") {
@@ -136,16 +143,19 @@ TEST_CASE("ground: Jacobians are the derivatives") {
       };
       check_jacobian(range, H);
     }
-    Eigen::MatrixXd H_axle = Eigen::MatrixXd::Zero(1, err::camera);
-    H_axle.block<1, 2>(0, err::normal) = predict_axle(x, x.imu.R_WB).H_normal;
-    const auto lean = [&](const Eigen::VectorXd& part) -> Eigen::VectorXd {
-      Eigen::VectorXd d = Eigen::VectorXd::Zero(x.error_size());
-      d.head(part.size()) = part;
-      d.segment<3>(err::odometer).setZero();  // part of the noise: unevenness under the wheels is far larger
-      const State moved = with_error(x, d);
-      return Eigen::VectorXd::Constant(1, predict_axle(moved, moved.imu.R_WB).lean);
-    };
-    check_jacobian(lean, H_axle);
+    for (const OdometerAxis axis : {OdometerAxis::forward, OdometerAxis::left}) {
+      const LeanPrediction z = predict_lean(x, x.imu.R_WB, axis);
+      Eigen::MatrixXd H = Eigen::MatrixXd::Zero(1, err::camera);
+      H.block<1, 2>(0, err::normal) = z.H_normal;
+      H.block<1, 3>(0, err::odometer) = z.H_odometer;
+      const auto lean = [&](const Eigen::VectorXd& part) -> Eigen::VectorXd {
+        Eigen::VectorXd d = Eigen::VectorXd::Zero(x.error_size());
+        d.head(part.size()) = part;
+        const State moved = with_error(x, d);
+        return Eigen::VectorXd::Constant(1, predict_lean(moved, moved.imu.R_WB, axis).lean);
+      };
+      check_jacobian(lean, H);
+    }
     const Eigen::Vector3d y_B = x.odometer.T_BO.R.col(1);
     const auto slopes = [&](const Eigen::VectorXd& part) -> Eigen::VectorXd {
       Eigen::VectorXd d = Eigen::VectorXd::Zero(x.error_size());

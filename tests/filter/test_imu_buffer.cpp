@@ -71,6 +71,31 @@ TEST_CASE("imu buffer: statistics of an interval") {
   CHECK(s.accel_density == doctest::Approx(1.0 * std::sqrt(0.005 / 6.0)));
 }
 
+TEST_CASE("imu buffer: the standard error of the mean, as its halves show it") {
+  ImuBuffer buffer(20);
+  for (int i = 0; i < 20; ++i) {  // it turns slower, and is pushed the harder
+    buffer.push({i * 5'000'000LL, {0.0, 0.0, i < 10 ? 0.05 : 0.01}, {i < 10 ? 0.2 : 0.6, 0.0, 9.81}});
+  }
+  const ImuStatistics changing = buffer.statistics(0, 100'000'000);
+  CHECK(changing.gyro_mean.z() == doctest::Approx(0.03));
+  CHECK(changing.gyro_error == doctest::Approx(0.02));
+  CHECK(changing.accel_error == doctest::Approx(0.2));
+
+  // Of white noise it is that of the mean: its standard deviation over the root of the number of samples.
+  std::mt19937_64 rng{18};
+  std::normal_distribution<double> normal;
+  constexpr int kRuns = 2000, kSamples = 100;
+  double squares = 0.0;
+  for (int run = 0; run < kRuns; ++run) {
+    ImuBuffer noisy(kSamples);
+    for (int i = 0; i < kSamples; ++i) {
+      noisy.push({i * 5'000'000LL, {0.0, 0.3 * normal(rng), 0.0}, Eigen::Vector3d::Zero()});
+    }
+    squares += std::pow(noisy.statistics(0, 1'000'000'000).gyro_error, 2) / kRuns;
+  }
+  CHECK(std::sqrt(squares) == about(0.03, 0.06));
+}
+
 TEST_CASE("imu buffer: the density of white noise, whatever the rate and the drift") {
   std::mt19937_64 rng{17};
   std::normal_distribution<double> normal;

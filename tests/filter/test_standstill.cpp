@@ -38,7 +38,7 @@ Standstill watch() { return {StandstillConfig{}, kFocal, FilterConfig{}.window};
 /// Does the vehicle stand, with this frame?
 bool stands(Standstill& standstill, const FeatureFrame& frame, const ImuStatistics& imu = quiet(),
             bool on_ground = false) {
-  standstill.update({frame, frame.t_ns, imu, Eigen::Vector3d(Eigen::Vector3d::Zero()), on_ground});
+  standstill.update({frame, frame.t_ns, imu, Standstill::GyroBias{}, on_ground});
   return standstill.stands();
 }
 
@@ -115,4 +115,32 @@ TEST_CASE("standstill: steps without an image in between do not hide that it sli
   CHECK(still);
   for (int i = 40; i < 70; ++i) see(i, 0.1 * (i - 40));
   CHECK_FALSE(still);
+}
+
+TEST_CASE("standstill: a vehicle that turns slower and slower does not stand, whatever its bias may be") {
+  for (const double error : {0.0, 0.01}) {  // of the mean rate
+    Standstill standstill = watch();
+    ImuStatistics imu = quiet();
+    imu.gyro_mean = {0.0, 0.0, 0.03};
+    imu.gyro_error = error;
+    for (int i = 1; i <= 30; ++i) {
+      const FeatureFrame blind{i * kFrame, {}};
+      standstill.add({(i - 1) * kFrame, i * kFrame, Eigen::Vector2d::Zero()});
+      standstill.update({blind, blind.t_ns, imu, std::nullopt, true});
+    }
+    CHECK(standstill.stands() == (error == 0.0));
+  }
+}
+
+TEST_CASE("standstill: a rate that may be bias does not end it, one that cannot be does") {
+  for (const double sigma : {0.0, 0.05}) {
+    Standstill standstill = watch();
+    ImuStatistics imu = quiet();
+    imu.gyro_mean = {0.0, 0.0, 0.06};
+    for (int i = 0; i < 30; ++i) {
+      const FeatureFrame frame = frame_at(i * kFrame, 0.0);
+      standstill.update({frame, frame.t_ns, imu, Standstill::GyroBias{Eigen::Vector3d::Zero(), sigma}, false});
+    }
+    CHECK(standstill.stands() == (sigma > 0.0));
+  }
 }

@@ -335,6 +335,27 @@ TEST_CASE("start: in the air, just before the wheels touch the ground, which the
   }
 }
 
+TEST_CASE("start: standing, a rate that changes is known as its halves agree") {
+  Calibration calibration;
+  calibration.encoder.emplace();
+  calibration.imu.gyro_noise = 2e-4;
+  for (const double change : {0.0, 0.01}) {  // of the rate, over half a second [rad/s]
+    CAPTURE(change);
+    Filter filter({}, calibration);
+    std::optional<Estimate> estimate;
+    for (int k = 0; k <= 300 && !estimate; ++k) {
+      const TimeNs t_ns = 1'000'000'000 + 5'000'000LL * k;
+      filter.add_imu({t_ns, {0.0, 0.0, 0.03 - change * k / 100.0}, {0.0, 0.0, 9.81}});
+      filter.add_encoder({t_ns, 0, 0});
+      if (k % 10 == 0) estimate = filter.process_without_image(t_ns);
+    }
+    REQUIRE(estimate);
+    const double sigma = std::sqrt(estimate->covariance(estimate_error::gyro_bias + 2, estimate_error::gyro_bias + 2));
+    CHECK(sigma > 0.25 * change);  // half of what the halves differ by
+    CHECK(sigma < 0.25 * change + 0.002);
+  }
+}
+
 TEST_CASE("start: why there is none, in words") {
   const simulator::Simulation simulation = simulate("flat1", 923, 12.0);
   Vehicle vehicle;

@@ -241,6 +241,11 @@ def begin_late(copy):
     copy.change(copy.sensors(), lambda rows: [row for row in rows if int(row[0]) >= begin])
 
 
+def quarter_turn(rows):
+    negative = lambda text: text[1:] if text.startswith("-") else "-" + text  # noqa: E731
+    return [[t, wy, negative(wx), wz, ay, negative(ax), az] for t, wx, wy, wz, ax, ay, az in rows]
+
+
 LEANING = [[1.0, 0.01, 0.01], [0.01, 1.0, 0.01], [0.01, 0.01, 1.0]]
 
 
@@ -279,6 +284,7 @@ ALTERATIONS = [
     Alteration("gyro_axes", "gyroscope whose axes measure 1 % of the turns about the other two", on(["imu0"], through_matrix(LEANING))),
     Alteration("accel_bias", "accelerometer's bias of 0.7 m/s^2 in x and y, nine times what the prior allows",
                on(["imu0"], each_value((4, 5), lambda x, column: x + (0.7 if column == 4 else -0.7)))),
+    Alteration("imu_turned", "inertial sensors turned by 90 degrees about the vertical; so the mower's are right", on(["imu0"], quarter_turn)),
     Alteration("gyro_degrees", "gyroscope in degrees per second", on(["imu0"], each_value(GYRO, lambda x, _: 57.29578 * x))),
     Alteration("accel_g", "accelerometer in g", on(["imu0"], each_value(ACCEL, lambda x, _: x / 9.80665))),
     Alteration("gyro_sign", "the yaw rate has the wrong sign", on(["imu0"], each_value((3,), lambda x, _: -x))),

@@ -8,10 +8,23 @@
 #include "filter/sources/ground/ground_rows.h"
 
 namespace ear {
+namespace {
+
+/// The next row, not yet counted.
+void add_lean(GroundRows& z, const LeanPrediction& predicted, double sigma) {
+  z.H.row(z.count).segment<2>(ground_column(err::normal)) = predicted.H_normal;
+  z.H.row(z.count).segment<3>(ground_column(err::odometer)) = predicted.H_odometer;
+  z.residual(z.count) = -predicted.lean;
+  z.sigma(z.count) = sigma;
+}
+
+}  // namespace
 
 Ground::Ground(const FilterConfig& config, const Calibration& calibration)
     : config_(config.odometer), level_off_(config.contact.confirmed_height), contact_(config, calibration) {
-  if (has_beams(calibration) && config.odometer.model == OdometerModel::terrain) lasers_ = calibration.lasers;
+  if (config.odometer.model != OdometerModel::terrain) return;
+  if (has_beams(calibration)) lasers_ = calibration.lasers;
+  unseen_ = !lasers_;
 }
 
 /// After a change of the ground under the wheels nothing is known of it.
@@ -50,12 +63,31 @@ void Ground::update(const BeamRanges& reading, const ImuBuffer& imu, CameraUpdat
     records.log.add(beam_source(beam), innovation, reading.t_ns);
     ++(innovation.fits ? records.statistics.beams_used : records.statistics.beams_rejected);
   }
-  const AxlePrediction axle = predict_axle(x, R_WB);
-  z.H.row(z.count).segment<2>(ground_column(err::normal)) = axle.H_normal;
-  z.residual(z.count) = -axle.lean;
-  z.sigma(z.count) = std::sqrt(2.0) * config_.unevenness / x.odometer.track_width;
+  LeanPrediction axle = predict_lean(x, R_WB, OdometerAxis::left);
+  axle.H_odometer.setZero();  // the ground is uneven under the wheels, where no beam sees it, by far more
+  add_lean(z, axle, std::sqrt(2.0) * config_.unevenness / x.odometer.track_width);
   weigh(z, running_.axle, reading.t_ns, ekf);
   ++z.count;
+  ekf.apply(z, 1.0, calibration);
+}
+
+/// What is wrong with the direction in which the wheels seem to point turns with the body, the ground does not: this is
+/// how a vehicle that turns on the spot finds out. It sways while it stands there.
+void Ground::stand(const WheelIncrement& increment, const ImuBuffer& imu, CameraUpdate calibration, Ekf& ekf) {
+  if (!unseen_) return;
+  const State& x = ekf.state();
+  const Eigen::Matrix3d R_WB = motion_at(middle_of(increment), x.imu, imu).R_WB;
+  if (!running_.stands) ekf.restart_normal(R_WB * x.odometer.T_BO.R.col(2));
+  running_.stands = true;
+  // The middle of the axle goes as far as the vehicle does, the wheels turn about it.
+  const double turned =
+      0.5 * std::abs(x.odometer.wheel_radius.dot(Eigen::Vector2d(-increment.angle(0), increment.angle(1))));
+  ekf.inflate_normal(config_.normal_walk * config_.normal_walk * turned);
+  GroundRows z;
+  for (const OdometerAxis axis : {OdometerAxis::forward, OdometerAxis::left}) {
+    add_lean(z, predict_lean(x, R_WB, axis), config_.body_pitch / std::sqrt(increment.duration()));
+    ++z.count;
+  }
   ekf.apply(z, 1.0, calibration);
 }
 

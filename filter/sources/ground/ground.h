@@ -41,6 +41,8 @@ class Ground {
 
   /// One reading of the beams: a row each (2)-(4), and one for the axle, which lies along the ground.
   void update(const BeamRanges& reading, const ImuBuffer& imu, CameraUpdate calibration, Ekf& ekf, Records& records);
+  /// Without beams, at a reading of the wheels: the body stands on ground whose slope changes as they roll. Two rows.
+  void stand(const WheelIncrement& increment, const ImuBuffer& imu, CameraUpdate calibration, Ekf& ekf);
 
   /// The state begins anew.
   void reset() { running_ = Running{}; }
@@ -56,12 +58,14 @@ class Ground {
     std::array<NoiseScore, kMaxBeams> beam;
     NoiseScore axle;  ///< that it lies along the ground
     bool known = false;
+    bool stands = false;                       ///< on ground that no beam sees, whose normal is a state since
     std::optional<TimeNs> misplaced_since_ns;  ///< readings whose plane the wheels do not stand on
   };
 
   OdometerConfig config_;
   double level_off_;                        ///< [m] a plane that is farther from the wheels is not the one below them
   std::optional<LaserCalibration> lasers_;  ///< where they are used
+  bool unseen_ = false;                     ///< nothing sees the ground, which counts
   ContactDetector contact_;
   Running running_;
 };

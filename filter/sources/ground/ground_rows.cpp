@@ -77,10 +77,12 @@ BeamPrediction predict_range(const State& x, const Eigen::Matrix3d& R_WB, const 
   return z;
 }
 
-AxlePrediction predict_axle(const State& x, const Eigen::Matrix3d& R_WB) {
+LeanPrediction predict_lean(const State& x, const Eigen::Matrix3d& R_WB, OdometerAxis axis) {
   const Eigen::Vector3d n_B = R_WB.transpose() * x.ground.n_W;
-  const Eigen::Vector3d y_B = x.odometer.T_BO.R.col(1);
-  return {y_B.dot(n_B), y_B.transpose() * normal_by_error(x, R_WB, n_B)};
+  const Eigen::Matrix3d& R_BO = x.odometer.T_BO.R;
+  const Eigen::Vector3d axis_O = Eigen::Vector3d::Unit(axis == OdometerAxis::forward ? 0 : 1);
+  const Eigen::RowVector3d axis_B = (R_BO * axis_O).transpose();
+  return {axis_B * n_B, axis_B * normal_by_error(x, R_WB, n_B), -n_B.transpose() * R_BO * skew(axis_O)};
 }
 
 }  // namespace ear

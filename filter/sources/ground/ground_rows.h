@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <optional>
 #include <vector>
 
@@ -47,12 +48,16 @@ struct BeamPrediction {
 [[nodiscard]] BeamPrediction predict_range(const State& x, const Eigen::Matrix3d& R_WB, const LaserBeam& beam,
                                            double offset);
 
-/// Both wheels stand on the ground, so the axle lies along it: 0 = lean + H_normal delta, lean = y_B . n_B.
-struct AxlePrediction {
-  double lean = 0.0;  ///< sine of the axle's angle to the ground
+/// The wheels stand on the ground, so an axis of the odometer lies along it, linearized:
+///   0 = lean + H_normal delta + H_odometer phi,   lean = axis_B . n_B
+struct LeanPrediction {
+  double lean = 0.0;  ///< sine of the axis' angle to the ground
   Eigen::RowVector2d H_normal = Eigen::RowVector2d::Zero();
+  Eigen::RowVector3d H_odometer = Eigen::RowVector3d::Zero();
 };
 
-[[nodiscard]] AxlePrediction predict_axle(const State& x, const Eigen::Matrix3d& R_WB);
+enum class OdometerAxis : std::uint8_t { forward, left };  ///< `left` is that of the axle
+
+[[nodiscard]] LeanPrediction predict_lean(const State& x, const Eigen::Matrix3d& R_WB, OdometerAxis axis);
 
 }  // namespace ear

@@ -47,10 +47,12 @@ ImuStatistics Standstill::recent(const ImuBuffer& imu, TimeNs t_ns) const {
 void Standstill::update(const Evidence& evidence) {
   const FeatureFrame& frame = evidence.frame;
   const ImuStatistics& imu = evidence.recent;
-  // Before the bias is known any rate may be bias: wheels or images have to show the rest.
-  const Eigen::Vector3d b_g = evidence.b_g.value_or(imu.gyro_mean);
+  // Before the bias is known any rate may be bias, if it stays the same: wheels or images have to show the rest.
+  const GyroBias bias = evidence.bias.value_or(GyroBias{imu.gyro_mean, 0.0});
+  const double white = imu.gyro_density / std::sqrt(std::max(imu.duration, kNoRest));
   const bool imu_quiet = imu.gyro_spread < config_.max_gyro_spread && imu.accel_spread < config_.max_accel_spread &&
-                         (imu.gyro_mean - b_g).norm() < config_.max_gyro;
+                         imu.gyro_error < std::hypot(config_.max_gyro / kClear, kClear * white) &&
+                         (imu.gyro_mean - bias.mean).norm() < std::hypot(config_.max_gyro, kClear * bias.sigma);
   const double max_flow_px = stands_ ? config_.leave_flow_px : config_.max_flow_px;
   const std::optional<double> flow_px = common_flow_px(frame);
   const std::optional<double> wheel_rest = evidence.on_ground ? wheel_rest_.duration(evidence.t_ns) : std::nullopt;

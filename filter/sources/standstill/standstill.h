@@ -37,13 +37,18 @@ class Standstill {
 
   void add(const WheelIncrement& increment) { wheel_rest_.add(increment); }
 
+  struct GyroBias {
+    Eigen::Vector3d mean = Eigen::Vector3d::Zero();  ///< [rad/s]
+    double sigma = 0.0;                              ///< standard deviation, largest axis [rad/s]
+  };
+
   /// What shows whether the vehicle stands, at a frame.
   struct Evidence {
     const FeatureFrame& frame;
-    TimeNs t_ns = 0;                     ///< IMU time
-    ImuStatistics recent;                ///< recent() then
-    std::optional<Eigen::Vector3d> b_g;  ///< nothing before the start
-    bool on_ground = false;              ///< the wheels show whether they turn
+    TimeNs t_ns = 0;               ///< IMU time
+    ImuStatistics recent;          ///< recent() then
+    std::optional<GyroBias> bias;  ///< nothing before the start
+    bool on_ground = false;        ///< the wheels show whether they turn
   };
   void update(const Evidence& evidence);
   /// Has the vehicle stood for config.duration?
