@@ -102,8 +102,6 @@ class Ekf {
   [[nodiscard]] const State& state() const { return state_; }
   [[nodiscard]] const Covariance& covariance() const { return covariance_; }
   [[nodiscard]] const Gate& gate() const { return gate_; }
-  /// Mean rate of the last piece integrated, bias and scale corrected [rad/s].
-  [[nodiscard]] const Eigen::Vector3d& rate_B() const { return last_.rate_B; }
   /// Are the state and its covariance numbers, no variance negative, and is the vehicle where it can be: no farther
   /// from its start than the fastest one gets, and known to as much?
   [[nodiscard]] bool possible() const;

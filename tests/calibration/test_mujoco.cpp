@@ -227,35 +227,38 @@ Calibration sketch_of(const Calibration& truth) {
 }  // namespace
 
 TEST_CASE("calibrate: wheels and beams of a vehicle of another physics") {
-  Vehicle vehicle(5);
-  Calibration truth = vehicle.true_calibration();
-  truth.encoder->wraps = false;
-  const Drive drive = vehicle.drive(recommended());
-  const Calibration sketch = sketch_of(truth);
-  const Priors priors = priors_of(sketch);
-  const Result result = calibrate(sketch, priors, {drive}, Settings{});
-
-  const std::vector<double> errors = errors_left(result, sketch, truth, priors);
   double squares = 0.0, count = 0.0;
-  for (std::size_t i = 0; i < errors.size(); ++i) {
-    const Finding& found = result.findings[i];
-    CAPTURE(found.name);
-    CHECK(found.shown);
-    CHECK(std::abs(errors[i]) < 5.0 * found.posterior);
-    squares += std::pow(errors[i] / found.posterior, 2);
-    count += 1.0;
+  for (const unsigned seed : {5U, 6U, 7U}) {
+    CAPTURE(seed);
+    Vehicle vehicle(seed);
+    Calibration truth = vehicle.true_calibration();
+    truth.encoder->wraps = false;
+    const Drive drive = vehicle.drive(recommended());
+    const Calibration sketch = sketch_of(truth);
+    const Priors priors = priors_of(sketch);
+    const Result result = calibrate(sketch, priors, {drive}, Settings{});
+
+    const std::vector<double> errors = errors_left(result, sketch, truth, priors);
+    for (std::size_t i = 0; i < errors.size(); ++i) {
+      const Finding& found = result.findings[i];
+      CAPTURE(found.name);
+      CHECK(found.shown);
+      CHECK(std::abs(errors[i]) < 5.0 * found.posterior);
+      squares += std::pow(errors[i] / found.posterior, 2);
+      count += 1.0;
+    }
+    CHECK(result.left_out < 5.0);  // the hops are in it
+    CHECK(result.findings.size() == 34);
+    const EncoderCalibration& encoder = *result.calibration.encoder;
+    for (std::size_t side = 0; side < 2; ++side) {
+      CHECK(encoder.wheel_radius[side] == about(truth.encoder->wheel_radius[side], 0.003));
+    }
+    CHECK(encoder.track_width == about(truth.encoder->track_width, 0.005));
+    for (std::size_t k = 0; k < kBeams.size(); ++k) {
+      const Eigen::Vector3d& found = result.calibration.lasers->beams[k].d_B;
+      CHECK(std::asin(found.cross(truth.lasers->beams[k].d_B).norm()) < 0.25 * kDegree);
+    }
   }
   MESSAGE("mean squared normalized error: " << squares / count);
   CHECK(squares / count < 2.0);  // of 34, correlated
-  CHECK(result.left_out < 5.0);  // the hops are in it
-  CHECK(result.findings.size() == 34);
-  const EncoderCalibration& encoder = *result.calibration.encoder;
-  for (std::size_t side = 0; side < 2; ++side) {
-    CHECK(encoder.wheel_radius[side] == about(truth.encoder->wheel_radius[side], 0.003));
-  }
-  CHECK(encoder.track_width == about(truth.encoder->track_width, 0.003));
-  for (std::size_t k = 0; k < kBeams.size(); ++k) {
-    const Eigen::Vector3d& found = result.calibration.lasers->beams[k].d_B;
-    CHECK(std::asin(found.cross(truth.lasers->beams[k].d_B).norm()) < 0.1 * kDegree);
-  }
 }

@@ -65,7 +65,7 @@ class Ground {
   OdometerConfig config_;
   double level_off_;                        ///< [m] a plane that is farther from the wheels is not the one below them
   std::optional<LaserCalibration> lasers_;  ///< where they are used
-  bool unseen_ = false;                     ///< nothing sees the ground, which counts
+  bool unseen_ = false;                     ///< no beam sees the ground, whose slope counts
   ContactDetector contact_;
   Running running_;
 };
