@@ -7,8 +7,10 @@
 
 #include "filter/ekf/so3.h"
 #include "filter/filter.h"
+#include "tests/support/random_state.h"
 
 using namespace ear;
+using ear::test::random_vector;
 
 namespace {
 
@@ -71,11 +73,7 @@ struct Height {
 /// One of many: bias and mounting are drawn from what the settings say of them.
 Height drive(std::uint64_t seed, double turn) {
   std::mt19937_64 rng{seed};
-  std::normal_distribution<double> normal;
-  const auto noise = [&](double sigma) -> Eigen::Vector3d {
-    const double x = normal(rng), y = normal(rng), z = normal(rng);
-    return sigma * Eigen::Vector3d(x, y, z);
-  };
+  const auto noise = [&](double sigma) { return random_vector(rng, sigma); };
   const FilterConfig config;
   Robot robot;
   robot.turn = turn;
