@@ -101,7 +101,7 @@ void CommonEstimator::add_encoder(const EncoderSample& given) {
   note(sources_.watch_contact(*taken.increment, ekf_));
   sources_.standstill().add(*taken.increment);
   if (!ekf_.running() && sources_.flies_at(taken.increment->from_ns)) {
-    ingest_.drop_readings();  // a start takes those that wait for wheels that roll
+    ingest_.drop_readings();  // a start takes in those that wait, as of wheels that roll
   } else if (const auto due_ns = ingest_.push(*taken.increment, ekf_.running())) {
     make_room(*due_ns);
   }
