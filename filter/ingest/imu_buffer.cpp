@@ -77,8 +77,10 @@ ImuStatistics ImuBuffer::statistics(TimeNs from_ns, TimeNs to_ns) const {
     const Eigen::Vector3d accel = (*this)[i].accel_B - reference.accel_B;
     s.gyro_mean += gyro;
     s.accel_mean += accel;
-    if (i < middle) gyro_first += gyro;
-    if (i < middle) accel_first += accel;
+    if (i < middle) {
+      gyro_first += gyro;
+      accel_first += accel;
+    }
     gyro_squares += gyro.cwiseAbs2();
     accel_squares += accel.cwiseAbs2();
     if (i == begin) continue;

@@ -59,8 +59,6 @@ class Sources {
 
   [[nodiscard]] bool uses_wheels() const { return wheels_.has_value(); }
   [[nodiscard]] bool on_ground() const { return wheels_ && ground_.carries(); }
-  /// Do the wheels hang in the air, or does the ground just spin them up? Not while that is unknown.
-  [[nodiscard]] bool flies_at(TimeNs t_ns) const { return ground_.contact_known() && !ground_.rolls_at(t_ns); }
   [[nodiscard]] const std::optional<Wheels>& wheels() const { return wheels_; }
   [[nodiscard]] Ground& ground() { return ground_; }
   [[nodiscard]] const Ground& ground() const { return ground_; }

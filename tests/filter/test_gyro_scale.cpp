@@ -7,8 +7,11 @@
 #include <optional>
 
 #include "filter/filter.h"
+#include "tests/support/hand_made_drive.h"
 
 using namespace ear;
+using ear::test::stamp;
+using ear::test::two_wheels;
 
 namespace {
 
@@ -17,17 +20,6 @@ constexpr double kDuration = 40.0;
 constexpr double kRadius = 0.1;
 constexpr double kTrack = 0.4;
 
-TimeNs stamp(double t) { return 1'000'000'000 + static_cast<TimeNs>(std::llround(1e9 * t)); }
-
-Calibration two_wheels() {
-  Calibration calibration;
-  EncoderCalibration& axle = calibration.encoder.emplace();
-  axle.wraps = false;
-  axle.wheel_radius = {kRadius, kRadius};
-  axle.track_width = kTrack;
-  return calibration;
-}
-
 /// Stands for two seconds, then drives in the plane: left turns of changing rate, with a turn to the right in between.
 double speed(double t) { return t < 2.0 ? 0.0 : 0.8 * (1.0 - std::exp(-(t - 2.0))); }
 double acceleration(double t) { return t < 2.0 ? 0.0 : 0.8 * std::exp(-(t - 2.0)); }
@@ -35,7 +27,7 @@ double yaw_rate(double t) { return t < 3.0 ? 0.0 : 0.25 + 0.35 * std::sin(0.3 * 
 
 /// At the end, with a gyroscope that measures (1 + `scale`) times the rate.
 Estimate drive(double scale, const FilterConfig& config, const Eigen::Matrix3d& told = Eigen::Matrix3d::Identity()) {
-  Calibration calibration = two_wheels();
+  Calibration calibration = two_wheels(kRadius, kTrack);
   calibration.imu.gyro_matrix = told;
   Filter filter(config, calibration);
   std::optional<Estimate> last;
@@ -72,7 +64,7 @@ struct Ramp {
 };
 
 Ramp drive_over_ramp(const FilterConfig& config) {
-  const Calibration calibration = two_wheels();
+  const Calibration calibration = two_wheels(kRadius, kTrack);
   Filter filter(config, calibration);
   Ramp result;
   double rolled = 0.0;  // [m] of each wheel against the body

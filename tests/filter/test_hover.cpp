@@ -11,10 +11,13 @@
 
 #include "filter/ekf/so3.h"
 #include "filter/filter.h"
+#include "tests/support/hand_made_drive.h"
 #include "tests/support/random_state.h"
 
 using namespace ear;
 using ear::test::random_vector;
+using ear::test::rate_of;
+using ear::test::stamp;
 
 namespace {
 
@@ -24,8 +27,6 @@ constexpr double kStands = 3.0;      // [s] before it takes off
 constexpr double kFocal = 385.0;     // [px]
 constexpr double kTrackNoise = 0.5;  // [px]
 constexpr double kShaken = 5.0;      // times the stated noise of the inertial samples
-
-TimeNs stamp(double t) { return 1'000'000'000 + static_cast<TimeNs>(std::llround(1e9 * t)); }
 
 Calibration two_cameras() {
   Calibration calibration;
@@ -62,8 +63,7 @@ struct Hover {
     return airborne(t) * Eigen::Vector3d(0.2 * std::sin(0.4 * t), 0.2 * std::sin(0.3 * t), 0.1 * std::sin(0.5 * t));
   }
   [[nodiscard]] Eigen::Vector3d gyro_B(double t) const {
-    constexpr double h = 1e-4;
-    return log_so3(R_WB(t - h).transpose() * R_WB(t + h)) / (2.0 * h);
+    return rate_of([this](double moment) { return R_WB(moment); }, t);
   }
   [[nodiscard]] Eigen::Vector3d accel_B(double t) const {
     constexpr double h = 2e-3;

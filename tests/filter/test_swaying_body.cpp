@@ -10,19 +10,21 @@
 #include "filter/ekf/so3.h"
 #include "filter/filter.h"
 #include "tests/support/about.h"
+#include "tests/support/hand_made_drive.h"
 #include "tests/support/random_state.h"
 
 using namespace ear;
 using ear::test::about;
 using ear::test::random_vector;
+using ear::test::rate_of;
+using ear::test::stamp;
+using ear::test::two_wheels;
 
 namespace {
 
 constexpr double kImuStep = 0.01;  // [s]
 constexpr double kDuration = 60.0;
 constexpr double kRadius = 0.34;  // of the wheels, as the calibration says [m]
-
-TimeNs stamp(double t) { return 1'000'000'000 + static_cast<TimeNs>(std::llround(1e9 * t)); }
 
 /// Along the world's x axis, faster and slower; the body nods with the acceleration and with the road.
 struct Car {
@@ -47,8 +49,7 @@ struct Car {
         .toRotationMatrix();
   }
   [[nodiscard]] Eigen::Vector3d gyro_B(double t) const {
-    constexpr double h = 1e-4;
-    return log_so3(R_WB(t - h).transpose() * R_WB(t + h)) / (2.0 * h);
+    return rate_of([this](double moment) { return R_WB(moment); }, t);
   }
   [[nodiscard]] Eigen::Vector3d accel_B(double t) const {
     return R_WB(t).transpose() * Eigen::Vector3d(acceleration(t), 0.0, 9.81);
@@ -71,13 +72,10 @@ Outcome drive(const Car& car, std::uint64_t seed, const FilterConfig& config = {
   const auto noise = [&](double sigma) -> Eigen::Vector3d {
     return sigma * Eigen::Vector3d(normal(rng), normal(rng), normal(rng));
   };
-  Calibration calibration;
+  Calibration calibration = two_wheels(kRadius, 1.57);
   calibration.imu.gyro_noise = 5e-4;
   calibration.imu.accel_noise = 1e-2;
-  EncoderCalibration& axle = calibration.encoder.emplace();
-  axle.wraps = false;
-  axle.wheel_radius = {kRadius, kRadius};
-  axle.track_width = 1.57;
+  EncoderCalibration& axle = *calibration.encoder;
   axle.noise_counts = 20.0;
   Filter filter(config, calibration);
 

@@ -7,10 +7,14 @@
 
 #include "filter/ekf/so3.h"
 #include "filter/filter.h"
+#include "tests/support/hand_made_drive.h"
 #include "tests/support/random_state.h"
 
 using namespace ear;
 using ear::test::random_vector;
+using ear::test::rate_of;
+using ear::test::stamp;
+using ear::test::two_wheels;
 
 namespace {
 
@@ -20,8 +24,6 @@ constexpr double kPush = 0.5;                       // [m/s^2] for a second, and
 constexpr double kLeg = 10.0, kTurn = 3.0;          // [s]
 constexpr int kLegs = 8;
 
-TimeNs stamp(double t) { return 1'000'000'000 + static_cast<TimeNs>(std::llround(1e9 * t)); }
-
 /// On level ground: straight ahead, a turn on the spot, and so on. The body rocks.
 struct Robot {
   double turn = 0.0;                                // after each leg [rad]
@@ -29,19 +31,15 @@ struct Robot {
   Eigen::Vector2d phase = Eigen::Vector2d::Zero();  // of its rocking [rad]
 
   struct Motion {
-    double heading = 0.0, distance = 0.0, acceleration = 0.0, speed = 0.0;
-    Eigen::Vector2d position = Eigen::Vector2d::Zero();
+    double heading = 0.0, distance = 0.0, acceleration = 0.0;
   };
   [[nodiscard]] Motion at(double t) const {
     Motion m;
     for (int leg = 0; leg < kLegs && t > 0.0; ++leg, t -= kLeg + kTurn) {
       const double s = std::min(t, kLeg);
       const double pushed = std::min(s, 1.0), braked = std::max(0.0, s - (kLeg - 1.0));
-      m.speed = kPush * (pushed - braked);
       m.acceleration = t < 1.0 ? kPush : t > kLeg - 1.0 && t < kLeg ? -kPush : 0.0;
-      const double way = 0.5 * kPush * pushed * pushed + kPush * (s - pushed) - 0.5 * kPush * braked * braked;
-      m.distance += way;
-      m.position += way * Eigen::Vector2d(std::cos(m.heading), std::sin(m.heading));
+      m.distance += 0.5 * kPush * pushed * pushed + kPush * (s - pushed) - 0.5 * kPush * braked * braked;
       const double part = std::min(std::max(0.0, t - kLeg), kTurn) / kTurn;
       m.heading += turn * (part - std::sin(2.0 * M_PI * part) / (2.0 * M_PI));
     }
@@ -56,8 +54,7 @@ struct Robot {
            exp_so3(mounting_W);
   }
   [[nodiscard]] Eigen::Vector3d gyro_B(double t) const {
-    constexpr double h = 1e-4;
-    return log_so3(R_WB(t - h).transpose() * R_WB(t + h)) / (2.0 * h);
+    return rate_of([this](double moment) { return R_WB(moment); }, t);
   }
   [[nodiscard]] Eigen::Vector3d accel_B(double t) const {
     const Motion m = at(t);
@@ -80,13 +77,10 @@ Height drive(std::uint64_t seed, double turn) {
   robot.mounting_W = noise(config.prior.odometer_unseen);
   robot.phase = noise(3.0).head<2>();
   const Eigen::Vector3d b_g = noise(0.01), b_a = noise(config.prior.accel_bias);
-  Calibration calibration;
+  Calibration calibration = two_wheels(kRadius, kTrackWidth);
   calibration.imu.gyro_noise = 5e-4;
   calibration.imu.accel_noise = 1e-2;
-  EncoderCalibration& axle = calibration.encoder.emplace();
-  axle.wraps = false;
-  axle.wheel_radius = {kRadius, kRadius};
-  axle.track_width = kTrackWidth;
+  EncoderCalibration& axle = *calibration.encoder;
   axle.noise_counts = 20.0;
   Filter filter(config, calibration);
 

@@ -131,12 +131,13 @@ def scattered_stamps(copy):
             [str(int(row[0]) + offsets.setdefault(milliseconds(row), round(draws.gauss(0.0, 3e6)))), *row[1:]] for row in rows])
 
 
-def through_matrix(matrix):
-    """What a gyroscope measures that shows the rate times this matrix."""
+def through_matrix(matrix, sensors=(GYRO,)):
+    """What gyroscope or accelerometer measure that show what is there times this matrix."""
     def change(rows):
         for row in rows:
-            for column, rate in zip(GYRO, rotate(matrix, [float(row[column]) for column in GYRO])):
-                row[column] = repr(rate)
+            for columns in sensors:
+                for column, value in zip(columns, rotate(matrix, [float(row[column]) for column in columns])):
+                    row[column] = repr(value)
         return rows
 
     return change
@@ -241,12 +242,8 @@ def begin_late(copy):
     copy.change(copy.sensors(), lambda rows: [row for row in rows if int(row[0]) >= begin])
 
 
-def quarter_turn(rows):
-    negative = lambda text: text[1:] if text.startswith("-") else "-" + text  # noqa: E731
-    return [[t, wy, negative(wx), wz, ay, negative(ax), az] for t, wx, wy, wz, ax, ay, az in rows]
-
-
 LEANING = [[1.0, 0.01, 0.01], [0.01, 1.0, 0.01], [0.01, 0.01, 1.0]]
+QUARTER_TURN = [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
 
 
 @dataclass(frozen=True)
@@ -284,7 +281,8 @@ ALTERATIONS = [
     Alteration("gyro_axes", "gyroscope whose axes measure 1 % of the turns about the other two", on(["imu0"], through_matrix(LEANING))),
     Alteration("accel_bias", "accelerometer's bias of 0.7 m/s^2 in x and y, nine times what the prior allows",
                on(["imu0"], each_value((4, 5), lambda x, column: x + (0.7 if column == 4 else -0.7)))),
-    Alteration("imu_turned", "inertial sensors turned by 90 degrees about the vertical; so the mower's are right", on(["imu0"], quarter_turn)),
+    Alteration("imu_turned", "inertial sensors turned by 90 degrees about the vertical; so the mower's are right",
+               on(["imu0"], through_matrix(QUARTER_TURN, (GYRO, ACCEL)))),
     Alteration("gyro_degrees", "gyroscope in degrees per second", on(["imu0"], each_value(GYRO, lambda x, _: 57.29578 * x))),
     Alteration("accel_g", "accelerometer in g", on(["imu0"], each_value(ACCEL, lambda x, _: x / 9.80665))),
     Alteration("gyro_sign", "the yaw rate has the wrong sign", on(["imu0"], each_value((3,), lambda x, _: -x))),

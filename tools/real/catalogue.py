@@ -72,5 +72,6 @@ HELD = {
                     "the truth is a plane, good to 0.7 m, and the wheels scrub in every turn"),
     "lawn_wheels": Held("a mower on grass: coarse wheels and IMU", "lawn_wheels",
                         "the truth is positions by radio, whose height alone scatters by 0.6 m; it begins 31 s after the estimate. "
-                        "NEES takes it for exact. The IMU is turned by 90 degrees against its calibration: its y points forward, and the health says so; `imu_turned` below has it right"),
+                        "NEES takes it for exact. The IMU is turned by 90 degrees against its calibration: its y points forward, "
+                        "and the health says so; `imu_turned` below has it right"),
 }

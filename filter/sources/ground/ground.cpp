@@ -22,9 +22,7 @@ void add_lean(GroundRows& z, const LeanPrediction& predicted, double sigma) {
 
 Ground::Ground(const FilterConfig& config, const Calibration& calibration)
     : config_(config.odometer), level_off_(config.contact.confirmed_height), contact_(config, calibration) {
-  if (config.odometer.model != OdometerModel::terrain) return;
-  if (has_beams(calibration)) lasers_ = calibration.lasers;
-  unseen_ = !lasers_;
+  if (has_beams(calibration) && config.odometer.model == OdometerModel::terrain) lasers_ = calibration.lasers;
 }
 
 /// After a change of the ground under the wheels nothing is known of it.
@@ -74,14 +72,14 @@ void Ground::update(const BeamRanges& reading, const ImuBuffer& imu, CameraUpdat
 /// What is wrong with the direction in which the wheels seem to point turns with the body, the ground does not: this is
 /// how a vehicle that turns on the spot finds out. It sways while it stands there.
 void Ground::stand(const WheelIncrement& increment, const ImuBuffer& imu, CameraUpdate calibration, Ekf& ekf) {
-  if (!unseen_) return;
+  if (lasers_ || config_.model != OdometerModel::terrain) return;
   const State& x = ekf.state();
   const Eigen::Matrix3d R_WB = motion_at(middle_of(increment), x.imu, imu).R_WB;
   if (!running_.stands) ekf.restart_normal(R_WB * x.odometer.T_BO.R.col(2));
   running_.stands = true;
   // The middle of the axle goes as far as the vehicle does, the wheels turn about it.
-  const double turned =
-      0.5 * std::abs(x.odometer.wheel_radius.dot(Eigen::Vector2d(-increment.angle(0), increment.angle(1))));
+  const Eigen::Vector2d rims = x.odometer.wheel_radius.cwiseProduct(increment.angle);
+  const double turned = 0.5 * std::abs(rims(1) - rims(0));
   ekf.inflate_normal(config_.normal_walk * config_.normal_walk * turned);
   GroundRows z;
   for (const OdometerAxis axis : {OdometerAxis::forward, OdometerAxis::left}) {

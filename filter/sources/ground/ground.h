@@ -30,10 +30,10 @@ class Ground {
 
   /// Do the wheels carry the vehicle?
   [[nodiscard]] bool carries() const { return contact_.mode() == ContactMode::ground; }
-  /// Has it been seen whether they do?
-  [[nodiscard]] bool contact_known() const { return contact_.mode() != ContactMode::unknown; }
   /// Do the wheels show how the vehicle moves? Not in the air, and not while the ground spins them up.
   [[nodiscard]] bool rolls_at(TimeNs t_ns) const;
+  /// Do they not? False also while it is unknown.
+  [[nodiscard]] bool flies_at(TimeNs t_ns) const { return contact_.mode() != ContactMode::unknown && !rolls_at(t_ns); }
   /// Have the lasers seen the ground since it was last touched?
   [[nodiscard]] bool known() const { return running_.known; }
   /// Beams that give the same range again and again.
@@ -49,7 +49,7 @@ class Ground {
 
  private:
   ContactEvent note(ContactEvent event);
-  /// The same at `t_ns`, and for `settled` seconds before it.
+  /// Do the wheels carry the vehicle at `t_ns`, and have they for `settled` seconds, as far as they were seen to land?
   [[nodiscard]] bool carries_at(TimeNs t_ns, double settled) const;
   bool restart(const BeamRanges& reading, const Eigen::Matrix3d& R_WB, Ekf& ekf);
   Innovation weigh(GroundRows& z, NoiseScore& score, TimeNs t_ns, const Ekf& ekf) const;
@@ -65,7 +65,6 @@ class Ground {
   OdometerConfig config_;
   double level_off_;                        ///< [m] a plane that is farther from the wheels is not the one below them
   std::optional<LaserCalibration> lasers_;  ///< where they are used
-  bool unseen_ = false;                     ///< no beam sees the ground, whose slope counts
   ContactDetector contact_;
   Running running_;
 };

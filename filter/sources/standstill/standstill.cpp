@@ -49,7 +49,7 @@ void Standstill::update(const Evidence& evidence) {
   const ImuStatistics& imu = evidence.recent;
   // Before the bias is known any rate may be bias, if it stays the same: wheels or images have to show the rest.
   const GyroBias bias = evidence.bias.value_or(GyroBias{imu.gyro_mean, 0.0});
-  const double white = imu.gyro_density / std::sqrt(std::max(imu.duration, kNoRest));
+  const double white = imu.count > 1 ? imu.gyro_density / std::sqrt(imu.duration) : 0.0;
   const bool imu_quiet = imu.gyro_spread < config_.max_gyro_spread && imu.accel_spread < config_.max_accel_spread &&
                          imu.gyro_error < std::hypot(config_.max_gyro / kClear, kClear * white) &&
                          (imu.gyro_mean - bias.mean).norm() < std::hypot(config_.max_gyro, kClear * bias.sigma);
