@@ -10,8 +10,7 @@
 #include "tests/support/hand_made_drive.h"
 
 using namespace ear;
-using ear::test::stamp;
-using ear::test::two_wheels;
+using namespace ear::test;
 
 namespace {
 

@@ -11,10 +11,7 @@
 #include "tests/support/random_state.h"
 
 using namespace ear;
-using ear::test::random_vector;
-using ear::test::rate_of;
-using ear::test::stamp;
-using ear::test::two_wheels;
+using namespace ear::test;
 
 namespace {
 
