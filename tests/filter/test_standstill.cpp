@@ -144,3 +144,29 @@ TEST_CASE("standstill: a rate that may be bias does not end it, one that cannot 
     CHECK(standstill.stands() == (sigma > 0.0));
   }
 }
+
+TEST_CASE("standstill: rest shows that the state is too fast, and nothing of its heading") {
+  constexpr TimeNs kStart = 1'000'000'000;
+  Calibration calibration;
+  calibration.encoder.emplace();
+  Ekf ekf(FilterConfig{}, calibration);
+  ImuState x;
+  x.t_ns = kStart;
+  x.v_W = {0.5, 0.2, 0.0};
+  x.p_WB = {3.0, 2.0, 1.0};
+  Eigen::VectorXd sigma = Eigen::VectorXd::Constant(err::clones, 0.01);
+  sigma(err::theta + 2) = 0.5;
+  sigma.segment<3>(err::nu).setConstant(0.3);
+  ekf.start(x, sigma);
+  ekf.clone(1.0);
+  ImuBuffer imu(64);
+  for (int i = 0; i <= 20; ++i) imu.push({kStart + i * 5'000'000, Eigen::Vector3d::Zero(), {0.0, 0.0, 9.81}});
+  ekf.propagate(imu, kStart + 50'000'000, {}, 0.0);
+
+  const double heading = ekf.state().imu.R_WB(1, 0);
+  const double variance = ekf.covariance().matrix()(err::theta + 2, err::theta + 2);
+  watch().hold(ekf);
+  CHECK(ekf.state().imu.v_W.norm() < 0.01);
+  CHECK(std::abs(ekf.state().imu.R_WB(1, 0) - heading) < 0.01);
+  CHECK(ekf.covariance().matrix()(err::theta + 2, err::theta + 2) == doctest::Approx(variance).epsilon(0.01));
+}

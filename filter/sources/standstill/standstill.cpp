@@ -128,7 +128,6 @@ void Standstill::hold(Ekf& ekf) {
   H.topRows<6>().array().colwise() *= weight;
   r.head<6>().array() *= weight;
   H.bottomRows<3>().setZero();
-  H.block<3, 3>(6, err::theta) = -skew(v_W) / config_.velocity_sigma;
   H.block<3, 3>(6, err::nu) = Eigen::Matrix3d::Identity() / config_.velocity_sigma;
   r.tail<3>() = -v_W / config_.velocity_sigma;
   ekf.apply(H, 0, r, CameraUpdate::considered);
