@@ -95,7 +95,7 @@ void CommonEstimator::add_encoder(const EncoderSample& given) {
   EncoderSample sample = given;
   sample.t_ns = later_by(calibration_.encoder->time_offset, given.t_ns);
   hear(ImuClock::Stream::encoder, sample.t_ns);
-  const Ingest::Encoders taken = ingest_.take(sample, ekf_.time());
+  const Ingest::Encoders taken = ingest_.take(sample, time_of(ekf_));
   if (!ingest_.imu().empty()) health_.add_encoder(taken.verdict, ingest_.imu().newest().t_ns);
   if (taken.verdict != Verdict::accepted || !taken.increment) return;
   note(sources_.watch_contact(*taken.increment, ekf_));
@@ -114,7 +114,7 @@ void CommonEstimator::add_laser(const LaserSample& given) {
   LaserSample& sample = laser_;
   sample.t_ns = t_ns;
   sample.range.assign(given.range.begin(), given.range.end());
-  const Verdict verdict = ingest_.judge(sample, ekf_.time());
+  const Verdict verdict = ingest_.judge(sample, time_of(ekf_));
   if (verdict == Verdict::accepted) note(sources_.watch_contact(sample, ekf_));
   if (!ingest_.imu().empty()) {
     const TimeNs newest_ns = ingest_.imu().newest().t_ns;

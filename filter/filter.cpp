@@ -34,7 +34,7 @@ std::optional<Estimate> Filter::process(const FeatureFrame& given) {
 std::optional<Estimate> Filter::process_without_image(TimeNs t_ns) {
   if (check_stamp(t_ns) != FrameStamp::usable) return std::nullopt;
   if (sources_.cameras().count() > 0 && !sources_.on_ground()) return std::nullopt;
-  if (ingest_.waits_for_imu(ekf_.time())) return std::nullopt;
+  if (ingest_.waits_for_imu(time_of(ekf_))) return std::nullopt;
   propagate_to(FeatureFrame{t_ns, {}});
   if (ekf_.running()) {
     sources_.update(nullptr, sources_.standstill().stands(), advice(), ekf_, records_);

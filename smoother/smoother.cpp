@@ -62,7 +62,7 @@ std::optional<Estimate> Smoother::process(const FeatureFrame& given) {
 
 std::optional<Estimate> Smoother::process_without_image(TimeNs t_ns) {
   if (check_stamp(t_ns) != FrameStamp::usable || (window_ && !sources_.on_ground())) return std::nullopt;
-  if (ingest_.waits_for_imu(ekf_.time())) return std::nullopt;
+  if (ingest_.waits_for_imu(time_of(ekf_))) return std::nullopt;
   move_to(FeatureFrame{t_ns, {}}, false);
   return report(false, FrameAgreement{});
 }

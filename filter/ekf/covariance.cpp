@@ -135,7 +135,26 @@ void Covariance::remove(int first, int count) {
 Eigen::Ref<const Eigen::VectorXd> Covariance::update(const Eigen::Ref<const Eigen::MatrixXd>& H, int first_column,
                                                      const Eigen::Ref<const Eigen::VectorXd>& residual,
                                                      int considered_first, int considered_count) {
+  const auto result = correction(H, first_column, residual, considered_first, considered_count);
+  const auto c = considered_count;
+  auto P_considered = P_.block(considered_first, considered_first, c, c);
+  considered_.topLeftCorner(c, c) = P_considered;
+  if (rows_ > 0) kernels_.subtract_square(readable(PHt_), rows_, size_, writable(P_));
+  P_considered = considered_.topLeftCorner(c, c);
+  return result;
+}
+
+ClonePair Covariance::corrected(int row, int column) const {
+  constexpr int size = err::clone_size;
+  return P_.block<size, size>(row, column) -
+         PHt_.block(row, 0, size, rows_).lazyProduct(PHt_.block(column, 0, size, rows_).transpose());
+}
+
+Eigen::Ref<const Eigen::VectorXd> Covariance::correction(const Eigen::Ref<const Eigen::MatrixXd>& H, int first_column,
+                                                         const Eigen::Ref<const Eigen::VectorXd>& residual,
+                                                         int considered_first, int considered_count) {
   const int n = size_;
+  rows_ = 0;
   const auto m = static_cast<int>(H.rows());
   const auto columns = static_cast<int>(H.cols());
   assert(m <= PHt_.cols() && first_column + columns <= n);
@@ -161,15 +180,10 @@ Eigen::Ref<const Eigen::VectorXd> Covariance::update(const Eigen::Ref<const Eige
   z = residual;
   if (!kernels_.factorize(writable(S_), m, z.data())) return correction;
   // Y = P H^T L^-T, in the place of P H^T, so that P H^T S^-1 H P = Y Y^T
-  const auto c = considered_count;
-  auto P_considered = P_.block(considered_first, considered_first, c, c);
-  considered_.topLeftCorner(c, c) = P_considered;
   kernels_.solve(readable(S_), n, m, writable(PHt_));
-  kernels_.subtract_square(readable(PHt_), m, n, writable(P_));
-  P_considered = considered_.topLeftCorner(c, c);
-
+  rows_ = m;
   correction.noalias() = PHt_.topLeftCorner(n, m) * z;
-  correction.segment(considered_first, c).setZero();
+  correction.segment(considered_first, considered_count).setZero();
   return correction;
 }
 

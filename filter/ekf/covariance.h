@@ -9,6 +9,9 @@
 
 namespace ear {
 
+/// Covariance of the poses of one clone with those of another.
+using ClonePair = Eigen::Matrix<double, err::clone_size, err::clone_size>;
+
 /// Symmetric matrix of the error vector (state.h). All memory is taken at construction.
 class Covariance {
  public:
@@ -53,11 +56,18 @@ class Covariance {
   Eigen::Ref<const Eigen::VectorXd> update(const Eigen::Ref<const Eigen::MatrixXd>& H, int first_column,
                                            const Eigen::Ref<const Eigen::VectorXd>& residual, int considered_first = 0,
                                            int considered_count = 0);
+  /// What update() would return. The covariance stays.
+  Eigen::Ref<const Eigen::VectorXd> correction(const Eigen::Ref<const Eigen::MatrixXd>& H, int first_column,
+                                               const Eigen::Ref<const Eigen::VectorXd>& residual,
+                                               int considered_first = 0, int considered_count = 0);
+  /// What update() with the rows of the last correction() would leave of two clones, which begin at `row` and `column`.
+  [[nodiscard]] ClonePair corrected(int row, int column) const;
 
  private:
   FilterKernels kernels_;
   Eigen::MatrixXd P_;  ///< with rows and columns beyond `capacity`, for the kernels
   int size_ = 0;
+  int rows_ = 0;  ///< of the last correction(), if it could be computed
   Eigen::MatrixXd Ht_, PHt_, S_, considered_;
   Eigen::VectorXd whitened_, correction_;
   std::vector<int> seen_;  ///< columns of H that are not zero

@@ -45,6 +45,13 @@ bool moves(const ImuState& x, const Covariance& P) {
   return x.v_W.squaredNorm() > kAboveNoise * kAboveNoise * variance;
 }
 
+/// The first entry that is only considered: from there on, up to the clones.
+int considered_from(bool learned, bool turns, const ImuState& x, const Covariance& P) {
+  if (!learned) return err::camera;
+  if (turns) return err::clones;
+  return moves(x, P) ? err::gyro_matrix : err::time_offset;
+}
+
 }  // namespace
 
 Ekf::Ekf(const FilterConfig& config, const Calibration& calibration)
@@ -140,15 +147,18 @@ void Ekf::apply(GroundRows& z, double weight, CameraUpdate calibration) {
   if (z.count > 0) apply(z.H.topRows(z.count), err::nu, z.residual.head(z.count), calibration);
 }
 
+Eigen::Ref<const Eigen::VectorXd> Ekf::correction(const Eigen::Ref<const Eigen::MatrixXd>& H, int first_column,
+                                                  const Eigen::Ref<const Eigen::VectorXd>& r,
+                                                  CameraUpdate calibration) {
+  const int considered = considered_from(calibration == CameraUpdate::learned && !calibration_.cameras.empty(),
+                                         last_.turns, state_.imu, covariance_);
+  return covariance_.correction(H, first_column, r, considered, err::clones - considered);
+}
+
 void Ekf::apply(const Eigen::Ref<const Eigen::MatrixXd>& H, int first_column,
                 const Eigen::Ref<const Eigen::VectorXd>& r, CameraUpdate calibration) {
-  const bool learned = calibration == CameraUpdate::learned && !calibration_.cameras.empty();
-  int considered = err::camera;  // the first of them: they lie together, up to the clones
-  if (learned && last_.turns) {
-    considered = err::clones;
-  } else if (learned) {
-    considered = moves(state_.imu, covariance_) ? err::gyro_matrix : err::time_offset;
-  }
+  const int considered = considered_from(calibration == CameraUpdate::learned && !calibration_.cameras.empty(),
+                                         last_.turns, state_.imu, covariance_);
   const auto variance = [this] { return covariance_.matrix().diagonal().segment<6>(err::b_g); };
   const BiasChanges::Vector6 before = variance();
   const Eigen::Ref<const Eigen::VectorXd> correction =

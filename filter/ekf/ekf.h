@@ -55,7 +55,6 @@ class Ekf {
   void reset();
   /// Is there a state?
   [[nodiscard]] bool running() const { return running_; }
-  [[nodiscard]] std::optional<TimeNs> time() const { return running_ ? std::optional(state_.imu.t_ns) : std::nullopt; }
 
   /// To `t_ns`, by the samples. The time of the first one, if any, that may be off by more than noise (clipped).
   /// `usual`: factors on the noise of all samples. `normal_walk`: how the ground's normal turns [rad/sqrt(m)].
@@ -74,6 +73,10 @@ class Ekf {
   /// Updates by whitened rows: residual = H e(first_column ...) + n, cov(n) = I.
   void apply(const Eigen::Ref<const Eigen::MatrixXd>& H, int first_column, const Eigen::Ref<const Eigen::VectorXd>& r,
              CameraUpdate calibration);
+
+  /// The error that apply() would correct, which is not corrected yet. Valid until the next of both.
+  Eigen::Ref<const Eigen::VectorXd> correction(const Eigen::Ref<const Eigen::MatrixXd>& H, int first_column,
+                                               const Eigen::Ref<const Eigen::VectorXd>& r, CameraUpdate calibration);
 
   /// The body's pose now joins the window. `feature_noise`: of what was seen from it, times the usual.
   void clone(double feature_noise);
@@ -134,5 +137,10 @@ class Ekf {
   double turned_ = 0.0;
   Eigen::Vector3d turned_path_ = Eigen::Vector3d::Zero();  ///< integral of turned_ v dt [rad m]
 };
+
+/// Of its state, if there is one.
+[[nodiscard]] inline std::optional<TimeNs> time_of(const Ekf& ekf) {
+  return ekf.running() ? std::optional(ekf.state().imu.t_ns) : std::nullopt;
+}
 
 }  // namespace ear

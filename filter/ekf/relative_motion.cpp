@@ -14,7 +14,7 @@ void linearize_relative_motion(const State& x, const Pose& T_B0B1, Eigen::Ref<Ei
   H.block<3, 3>(3, err::rho).setIdentity();
   auto H_clone = H.rightCols<err::clone_size>();
   H_clone.topLeftCorner<3, 3>() = -Eigen::Matrix3d::Identity();
-  H_clone.bottomLeftCorner<3, 3>() = skew(x.imu.p_WB);
+  H_clone.bottomLeftCorner<3, 3>() = skew(x.imu.p_WB);  // as of the body: a turn of both moves nothing in the clone
   H_clone.bottomRightCorner<3, 3>() = -Eigen::Matrix3d::Identity();
 }
 

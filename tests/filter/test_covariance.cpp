@@ -109,8 +109,13 @@ TEST_CASE("covariance: the update is Kalman's, and stays symmetric and positive"
     H.rightCols(part.cols()) = part;
     const Eigen::MatrixXd S = H * before * H.transpose() + Eigen::MatrixXd::Identity(rows, rows);
     const Eigen::MatrixXd K = before * H.transpose() * S.inverse();
+    const Eigen::VectorXd beforehand = P.correction(part, first, r);
+    CHECK((P.matrix() - before).norm() == 0.0);
+    const ClonePair pair = P.corrected(err::clone(0), err::clone(1));
     const Eigen::VectorXd correction = P.update(part, first, r);
     CHECK((correction - K * r).norm() < 1e-9);
+    CHECK((correction - beforehand).norm() == 0.0);
+    CHECK((pair - P.matrix().block<err::clone_size, err::clone_size>(err::clone(0), err::clone(1))).norm() < 1e-12);
     CHECK((P.matrix() - (before - K * S * K.transpose())).norm() < 1e-9);
     CHECK((P.matrix() - P.matrix().transpose()).norm() == 0.0);
     CHECK(Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(P.matrix()).eigenvalues().minCoeff() > 0.0);

@@ -66,10 +66,10 @@ bool apply_if_it_fits(Ekf& ekf, GroundRows& z, double weight) {
 TEST_CASE("ekf: a fresh one has no state, and reset() is back there") {
   Ekf ekf(FilterConfig{}, vehicle());
   CHECK_FALSE(ekf.running());
-  CHECK_FALSE(ekf.time());
+  CHECK_FALSE(time_of(ekf));
   ekf = started();
   ekf.clone(1.0);
-  CHECK(ekf.time() == kStart);
+  CHECK(time_of(ekf) == kStart);
   ekf.reset();
   CHECK_FALSE(ekf.running());
   CHECK(ekf.state().clones.empty());

@@ -262,6 +262,10 @@ TEST_CASE("feature: an update by two features is that of their stacked rows") {
   const Eigen::VectorXd correction = P.update(information.H(), err::camera, information.residual());
   CHECK((correction - expected).norm() < 1e-6 * expected.norm());
   CHECK((P.matrix() - (P0 - P0 * H_all.transpose() * S.ldlt().solve(H_all * P0))).norm() < 1e-6 * P0.norm());
+  // Of a state that is not corrected yet the residuals are those and the correction's.
+  const Eigen::VectorXd r = information.residual();
+  information.take_back(correction.tail(correction.size() - err::camera));
+  CHECK((information.residual() - r - information.H() * correction.tail(information.H().cols())).norm() < 1e-9);
 }
 
 TEST_CASE("feature: the gate is the chi-square of the projected innovation") {

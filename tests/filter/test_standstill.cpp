@@ -1,8 +1,10 @@
 #include <doctest/doctest.h>
 
 #include "filter/sources/standstill/standstill.h"
+#include "tests/support/about.h"
 
 using namespace ear;
+using ear::test::about;
 
 namespace {
 
@@ -168,5 +170,5 @@ TEST_CASE("standstill: rest shows that the state is too fast, and nothing of its
   watch().hold(ekf);
   CHECK(ekf.state().imu.v_W.norm() < 0.01);
   CHECK(std::abs(ekf.state().imu.R_WB(1, 0) - heading) < 0.01);
-  CHECK(ekf.covariance().matrix()(err::theta + 2, err::theta + 2) == doctest::Approx(variance).epsilon(0.01));
+  CHECK(ekf.covariance().matrix()(err::theta + 2, err::theta + 2) == about(variance, 0.01 * variance));
 }

@@ -22,17 +22,19 @@ struct Uncertain {
   double velocity = 0.0;  ///< [m/s] standard deviation
   double heading = 1e-4;  ///< [rad]
   double position = 0.01;
+  Eigen::Vector3d missed = Eigen::Vector3d::Zero();  ///< [m/s] by which the vehicle is faster than it thinks
 };
 
 /// A vehicle at constant speed far from its origin, and what it saw of points 3 m away from five places.
 struct Passage {
   FilterConfig config;
+  Eigen::Vector3d missed;
   Ekf ekf;
   TrackTable tracks{64, 16};
   TrackUpdate update{config, kFocal};
   Records records;
 
-  explicit Passage(const Uncertain& sigma, std::size_t cameras = 1) : ekf(config, rig(cameras)) {
+  explicit Passage(const Uncertain& sigma, std::size_t cameras = 1) : missed(sigma.missed), ekf(config, rig(cameras)) {
     ImuState x;
     x.t_ns = kStart;
     x.v_W = {kSpeed, 0.0, 0.0};
@@ -59,7 +61,8 @@ struct Passage {
   }
   void see(bool by_both) {
     const State& x = ekf.state();
-    const Pose T_WC0 = x.clones.back().T_WB * x.camera.T_BC0;
+    Pose T_WC0 = x.clones.back().T_WB * x.camera.T_BC0;
+    T_WC0.p += missed * seconds_between(kStart, x.imu.t_ns);
     const Pose& T_C0C1 = x.camera.T_C0C1;
     std::vector<FeatureObservation> features;
     for (std::uint64_t id = 0; id < 20; ++id) {
@@ -124,4 +127,16 @@ TEST_CASE("track update: two cameras are as far apart as they are") {
   passage.run();
   CHECK(passage.records.statistics.features_used == 20);
   CHECK(passage.velocity_sigma(0) < 0.1 * kSpeed);
+}
+
+TEST_CASE("track update: where one camera shows another way than was thought, the state ends nearest to it") {
+  const Eigen::Vector3d missed{0.0, 0.6 * kSpeed, 0.0};
+  Passage passage({0.2 * kSpeed, 1e-4, 0.01, missed});
+  passage.run();
+  CHECK(passage.records.statistics.features_used == 20);
+  // The images show the direction and no length: of all velocities along it the nearest to the one before, as all
+  // directions were known equally well. The first step alone leaves the speed along x as it was.
+  const Eigen::Vector3d before{kSpeed, 0.0, 0.0};
+  const Eigen::Vector3d along = (before + missed).normalized();
+  CHECK((passage.ekf.state().imu.v_W - along * along.dot(before)).norm() < 0.02 * kSpeed);
 }

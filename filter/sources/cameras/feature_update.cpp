@@ -219,4 +219,8 @@ void FeatureInformation::compress(double negligible) {
   H_.topLeftCorner(rows_.count, size_) = rows_.H_transposed.topLeftCorner(size_, rows_.count).transpose();
 }
 
+void FeatureInformation::take_back(const Eigen::Ref<const Eigen::VectorXd>& error) {
+  rows_.r.head(rows_.count).noalias() += H() * error;
+}
+
 }  // namespace ear

@@ -73,6 +73,8 @@ class FeatureInformation {
   /// be left out; smaller ones come last.
   void compress(double negligible = kRounding);
   [[nodiscard]] Eigen::Ref<const Eigen::MatrixXd> H() const { return H_.topLeftCorner(rows_.count, size_); }
+  /// The residuals become those of a state that this error, from err::camera on, is not corrected of yet.
+  void take_back(const Eigen::Ref<const Eigen::VectorXd>& error);
   [[nodiscard]] Eigen::Ref<const Eigen::VectorXd> residual() const { return rows_.r.head(rows_.count); }
 
  private:

@@ -28,10 +28,14 @@ class TrackUpdate {
 
  private:
   void select(const State& x, bool oldest_goes, const TrackTable& tracks);
-  bool add(const Track& track, const Ekf& ekf);
+  /// The rows of the selected tracks, by the poses of `at`. `again`: where an update found the state to be.
+  void linearize(const TrackTable& tracks, const State& at, bool again, const Ekf& ekf);
+  /// The rows become those of where they move the state to.
+  void iterate(const TrackTable& tracks, CameraUpdate calibration, Ekf& ekf);
+  bool add(const Track& track, const State& at, bool again, const Ekf& ekf);
   /// Normalized: what the linearisation leaves out of where the feature of `sightings_`, with this inverse depth [1/m],
   /// is seen.
-  [[nodiscard]] double left_out(const Track& track, double inverse_depth, const Ekf& ekf) const;
+  [[nodiscard]] double left_out(const Track& track, double inverse_depth, bool again, const Ekf& ekf) const;
   void add_to_pattern(const Track& track, const CameraState& cameras);
   void log(const Ekf& ekf, Records& records) const;
 
@@ -45,12 +49,16 @@ class TrackUpdate {
   double focal_px_;
   std::array<Residuals, 2> residuals_;
   LensPattern lens_pattern_;
+  double most_left_out_ = 0.0;  ///< of all tracks, over the noise of an image
   // Memory that is used again.
   FeatureInformation information_;
   std::vector<CameraPose> cameras_;
   std::vector<Sighting> sightings_;
   std::vector<LinearizedObservation> observations_;
   std::vector<std::size_t> selected_;
+  std::vector<bool> used_;  ///< of these
+  State found_;             ///< where an update would move the state
+  Eigen::VectorXd moved_;   ///< there, from the state, as an error
 };
 
 }  // namespace ear

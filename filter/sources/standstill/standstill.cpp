@@ -128,6 +128,7 @@ void Standstill::hold(Ekf& ekf) {
   H.topRows<6>().array().colwise() *= weight;
   r.head<6>().array() *= weight;
   H.bottomRows<3>().setZero();
+  // Of the velocity in the body: that in the world would show a heading by a velocity which rest is about to deny.
   H.block<3, 3>(6, err::nu) = Eigen::Matrix3d::Identity() / config_.velocity_sigma;
   r.tail<3>() = -v_W / config_.velocity_sigma;
   ekf.apply(H, 0, r, CameraUpdate::considered);
