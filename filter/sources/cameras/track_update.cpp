@@ -63,7 +63,7 @@ void TrackUpdate::update(bool oldest_goes, CameraUpdate calibration, TrackTable&
   const State& x = ekf.state();
   select(x, oldest_goes, tracks);
   linearize(tracks, x, false, ekf);
-  if (most_left_out_ > kPrecise) iterate(tracks, calibration, ekf);
+  if (most_left_out_ > 1.0) iterate(tracks, calibration, ekf);  // more than an image's noise
   for (std::size_t k = 0; k < selected_.size(); ++k) {
     const std::size_t i = selected_[k];
     const bool used = used_[k];
