@@ -136,10 +136,11 @@ Eigen::Ref<const Eigen::VectorXd> Covariance::update(const Eigen::Ref<const Eige
                                                      const Eigen::Ref<const Eigen::VectorXd>& residual,
                                                      int considered_first, int considered_count) {
   const auto result = correction(H, first_column, residual, considered_first, considered_count);
+  if (rows_ == 0) return result;
   const auto c = considered_count;
   auto P_considered = P_.block(considered_first, considered_first, c, c);
   considered_.topLeftCorner(c, c) = P_considered;
-  if (rows_ > 0) kernels_.subtract_square(readable(PHt_), rows_, size_, writable(P_));
+  kernels_.subtract_square(readable(PHt_), rows_, size_, writable(P_));
   P_considered = considered_.topLeftCorner(c, c);
   return result;
 }

@@ -46,8 +46,9 @@ bool moves(const ImuState& x, const Covariance& P) {
 }
 
 /// The first entry that is only considered: from there on, up to the clones.
-int considered_from(bool learned, bool turns, const ImuState& x, const Covariance& P) {
-  if (!learned) return err::camera;
+int considered_from(CameraUpdate update, const Calibration& calibration, bool turns, const ImuState& x,
+                    const Covariance& P) {
+  if (update != CameraUpdate::learned || calibration.cameras.empty()) return err::camera;
   if (turns) return err::clones;
   return moves(x, P) ? err::gyro_matrix : err::time_offset;
 }
@@ -150,15 +151,13 @@ void Ekf::apply(GroundRows& z, double weight, CameraUpdate calibration) {
 Eigen::Ref<const Eigen::VectorXd> Ekf::correction(const Eigen::Ref<const Eigen::MatrixXd>& H, int first_column,
                                                   const Eigen::Ref<const Eigen::VectorXd>& r,
                                                   CameraUpdate calibration) {
-  const int considered = considered_from(calibration == CameraUpdate::learned && !calibration_.cameras.empty(),
-                                         last_.turns, state_.imu, covariance_);
+  const int considered = considered_from(calibration, calibration_, last_.turns, state_.imu, covariance_);
   return covariance_.correction(H, first_column, r, considered, err::clones - considered);
 }
 
 void Ekf::apply(const Eigen::Ref<const Eigen::MatrixXd>& H, int first_column,
                 const Eigen::Ref<const Eigen::VectorXd>& r, CameraUpdate calibration) {
-  const int considered = considered_from(calibration == CameraUpdate::learned && !calibration_.cameras.empty(),
-                                         last_.turns, state_.imu, covariance_);
+  const int considered = considered_from(calibration, calibration_, last_.turns, state_.imu, covariance_);
   const auto variance = [this] { return covariance_.matrix().diagonal().segment<6>(err::b_g); };
   const BiasChanges::Vector6 before = variance();
   const Eigen::Ref<const Eigen::VectorXd> correction =

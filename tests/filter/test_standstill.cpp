@@ -170,5 +170,5 @@ TEST_CASE("standstill: rest shows that the state is too fast, and nothing of its
   watch().hold(ekf);
   CHECK(ekf.state().imu.v_W.norm() < 0.01);
   CHECK(std::abs(ekf.state().imu.R_WB(1, 0) - heading) < 0.01);
-  CHECK(ekf.covariance().matrix()(err::theta + 2, err::theta + 2) == about(variance, 0.01 * variance));
+  CHECK(ekf.covariance().matrix()(err::theta + 2, err::theta + 2) == about(variance, 0.0025));
 }

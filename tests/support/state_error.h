@@ -15,6 +15,18 @@ namespace ear::test {
   return x;
 }
 
+/// The errors that no sensor shows, one in each column: a turn of everything about gravity, and shifts along x, y, z.
+[[nodiscard]] inline Eigen::MatrixXd unobservable(const State& x) {
+  Eigen::MatrixXd N = Eigen::MatrixXd::Zero(x.error_size(), 4);
+  const auto add_pose = [&N](int theta, int rho) {
+    N.block<3, 1>(theta, 0) = Eigen::Vector3d::UnitZ();
+    N.block<3, 3>(rho, 1).setIdentity();
+  };
+  add_pose(err::theta, err::rho);
+  for (int i = 0; i < static_cast<int>(x.clones.size()); ++i) add_pose(err::clone(i), err::clone(i) + 3);
+  return N;
+}
+
 /// Theta and rho between two poses.
 [[nodiscard]] inline Eigen::Matrix<double, 6, 1> invariant_difference(const Pose& truth, const Pose& estimate) {
   const Eigen::Matrix3d E = truth.R * estimate.R.transpose();

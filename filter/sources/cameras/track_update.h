@@ -32,7 +32,7 @@ class TrackUpdate {
   void linearize(const TrackTable& tracks, const State& at, bool again, const Ekf& ekf);
   /// The rows become those of where they move the state to.
   void iterate(const TrackTable& tracks, CameraUpdate calibration, Ekf& ekf);
-  bool add(const Track& track, const State& at, bool again, const Ekf& ekf);
+  bool add(const Track& track, const State& x, bool again, const Ekf& ekf);
   /// Normalized: what the linearisation leaves out of where the feature of `sightings_`, with this inverse depth [1/m],
   /// is seen.
   [[nodiscard]] double left_out(const Track& track, double inverse_depth, bool again, const Ekf& ekf) const;
