@@ -4,6 +4,7 @@
 
 #include "filter/ekf/so3.h"
 #include "filter/ingest/limits.h"
+#include "filter/sources/wheels/reading_noise.h"
 #include "filter/start/start_fit.h"
 #include "filter/start/start_sums.h"
 
@@ -12,6 +13,10 @@ namespace {
 
 constexpr double kSpeedSigma = 0.02;      // [m/s] chosen: the least of a speed
 constexpr double kDirectionSigma = 0.05;  // [rad] chosen: of the velocity in the body, which pitches about the axle
+
+double mean_speed(const WheelIncrement& turn, const Eigen::Vector2d& wheel_radius) {
+  return wheel_radius.dot(turn.angle) / (2.0 * turn.duration());
+}
 
 }  // namespace
 
@@ -31,6 +36,9 @@ StartAttempt rolling_start(const ImuBuffer& imu, const Ring<WheelIncrement>& tur
   const TimeNs start_ns = turns.front().from_ns;
   StartFit fit(prior_sigma);
   StartSums sums;
+  const double usual_dt = seconds_between(start_ns, turns.back().to_ns) / static_cast<double>(turns.size());
+  ReadingNoise readings;
+  for (std::size_t k = 0; k < turns.size(); ++k) readings.add(mean_speed(turns[k], odometer.wheel_radius), turns[k]);
   TimeNs now_ns = start_ns;
   for (std::size_t k = 0; k < turns.size(); ++k) {
     const WheelIncrement& turn = turns[k];
@@ -43,8 +51,7 @@ StartAttempt rolling_start(const ImuBuffer& imu, const Ring<WheelIncrement>& tur
                        });
     now_ns = middle_ns;
     const Eigen::Matrix3d& R_BO = odometer.T_BO.R;
-    const double speed = odometer.wheel_radius.dot(turn.angle) / (2.0 * turn.duration()) +
-                         odometer.wheel_radius.mean() * R_BO.col(1).dot(rate);
+    const double speed = mean_speed(turn, odometer.wheel_radius) + odometer.wheel_radius.mean() * R_BO.col(1).dot(rate);
     const Eigen::Vector3d u = sums.R * (speed * R_BO.col(0) - rate.cross(odometer.T_BO.p));
     StartFit::Rows H = StartFit::Rows::Zero();
     H.middleCols<3>(StartFit::velocity).setIdentity();
@@ -52,8 +59,9 @@ StartAttempt rolling_start(const ImuBuffer& imu, const Ring<WheelIncrement>& tur
     H.middleCols<3>(StartFit::gyro_bias) = sums.velocity_by_b_g + skew(u) * sums.R_by_b_g;
     H.middleCols<3>(StartFit::accel_bias) = sums.velocity_by_b_a();
     const Eigen::Vector3d z = u - sums.velocity;
-    const double direction = std::hypot(kDirectionSigma, std::sqrt(2.0) * stamp_sigma / turn.duration());
-    const double sigma = std::hypot(kSpeedSigma, direction * speed);
+    const double stamps = std::max(std::sqrt(2.0) * stamp_sigma * std::abs(speed), readings.of_increment());
+    const double sigma =
+        std::hypot(kSpeedSigma, kDirectionSigma * speed, stamps / std::sqrt(usual_dt * turn.duration()));
     fit.add(H, z, sigma * sigma);
   }
   const std::optional<StartFit::Vector> x = fit.solve();

@@ -100,6 +100,21 @@ TEST_CASE("rolling start: encoders at 50, 10 and 5 Hz, and at 10 Hz with stamps 
   }
 }
 
+TEST_CASE("rolling start: stamps that scatter by more than is stated") {
+  const simulator::Simulation simulation = drive("flat1", 824);
+  for (const std::size_t every : {std::size_t{1}, std::size_t{4}}) {  // at 100 and at 25 Hz
+    CAPTURE(every);
+    for (const double from : {7.0, 13.0, 19.0}) {
+      CAPTURE(from);
+      const Window window(simulation, from, every, 0.0045);
+      const auto state = rolling_start(window.imu, window.turns, window.odometer, kPrior, 0.0).x;
+      REQUIRE(state);
+      const simulator::Truth truth = simulation.truth(state->t_ns);
+      CHECK((state->R_WB.transpose() * state->v_W - truth.R_WB.transpose() * truth.v_W).norm() < 0.2);
+    }
+  }
+}
+
 TEST_CASE("rolling start: what the readings lack") {
   const simulator::Simulation simulation = drive("flat1", 822);
   const Window window(simulation, 8.0);
