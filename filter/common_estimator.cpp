@@ -99,7 +99,7 @@ void CommonEstimator::add_encoder(const EncoderSample& given) {
   if (!ingest_.imu().empty()) health_.add_encoder(taken.verdict, ingest_.imu().newest().t_ns);
   if (taken.verdict != Verdict::accepted || !taken.increment) return;
   note(sources_.watch_contact(*taken.increment, ekf_));
-  sources_.standstill().add(*taken.increment);
+  sources_.watch_wheels(*taken.increment);
   if (!ekf_.running() && sources_.ground().flies_at(taken.increment->from_ns)) {
     ingest_.drop_readings();  // a start takes in those that wait, as of wheels that roll
   } else if (const auto due_ns = ingest_.push(*taken.increment, ekf_.running())) {

@@ -66,7 +66,7 @@ void Filter::watch_biases() {
   const BiasJump jump = bias_watch_.judge(ekf_.take_bias_changes(), t_ns);
   if (!jump.any()) return;
   ekf_.inflate_motion(jump.gyro * kStale, jump.accel * kStale, 0.5 * jump.accel * kStale * kStale);
-  ekf_.inflate_biases(jump.gyro, jump.accel);
+  ekf_.inflate(err::b_g, bias_sigma(jump.gyro, jump.accel));
   health_.report_imu_fault(jump.fault, t_ns);
 }
 
@@ -93,6 +93,7 @@ void Filter::start(const FeatureFrame& frame) {
   Start::Situation now{frame, t_ns, lost ? ImuStatistics{} : sources_.standstill().recent(ingest_.imu(), t_ns)};
   now.stands = sources_.standstill().stands();
   now.rolls = sources_.on_ground();
+  if (sources_.wheels()) now.wheel_noise = sources_.wheels()->shown_noise();
   now.lost = lost;
   now.contradicted = health_.contradicted();
   if (!lost && without_state_ != Status::lost)

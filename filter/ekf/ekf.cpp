@@ -209,10 +209,10 @@ void Ekf::inflate_time(double seconds) {
   covariance_.inflate(err::theta, Eigen::Matrix<double, 9, 9>(seconds * seconds * J * J.transpose()));
 }
 
-void Ekf::inflate_biases(double gyro, double accel) {
-  Eigen::Matrix<double, 6, 1> sigma;
-  sigma << Eigen::Vector3d::Constant(gyro), Eigen::Vector3d::Constant(accel);
-  covariance_.inflate(err::b_g, sigma.cwiseAbs2().asDiagonal().toDenseMatrix());
+void Ekf::inflate(int first, const Eigen::Ref<const Eigen::VectorXd>& sigma) {
+  for (int i = 0; i < sigma.size(); ++i) {
+    covariance_.inflate(first + i, Eigen::Matrix<double, 1, 1>(sigma(i) * sigma(i)));
+  }
 }
 
 void Ekf::restart_normal(const Eigen::Vector3d& n_W) {
@@ -221,7 +221,11 @@ void Ekf::restart_normal(const Eigen::Vector3d& n_W) {
   covariance_.restart(err::normal, sigma);
 }
 
-void Ekf::inflate_normal(double variance) { covariance_.inflate(err::normal, variance * Eigen::Matrix2d::Identity()); }
+void Ekf::restart_reading(int index, double sigma) {
+  state_.odometer.reading_error(index) = 0.0;
+  if (sigma == 0.0 && covariance_.matrix()(err::readings + index, err::readings + index) == 0.0) return;
+  covariance_.restart(err::readings + index, Eigen::Matrix<double, 1, 1>(sigma));
+}
 
 BiasChanges Ekf::take_bias_changes() {
   const BiasChanges changes = bias_changes_;

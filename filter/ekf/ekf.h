@@ -90,12 +90,12 @@ class Ekf {
   void inflate_motion(double rotation, double velocity, double position);
   /// By that of the time that passed [s].
   void inflate_time(double seconds);
-  /// The biases may be elsewhere: gyroscope [rad/s], accelerometer [m/s^2].
-  void inflate_biases(double gyro, double accel);
+  /// The entries from `first` on may be elsewhere by these standard deviations besides, each by itself.
+  void inflate(int first, const Eigen::Ref<const Eigen::VectorXd>& sigma);
   /// The ground's normal is this one, and as little known as before anything showed it.
   void restart_normal(const Eigen::Vector3d& n_W);
-  /// The ground's normal may have turned by this variance [rad^2] besides.
-  void inflate_normal(double variance);
+  /// OdometerState::reading_error of this index is that of a new reading, with this standard deviation [m].
+  void restart_reading(int index, double sigma);
 
   /// Since the last call.
   [[nodiscard]] BiasChanges take_bias_changes();

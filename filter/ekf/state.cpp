@@ -38,6 +38,7 @@ void boxplus(State& x, const Eigen::Ref<const Eigen::VectorXd>& d) {
   x.odometer.T_BO.R = renormalized(x.odometer.T_BO.R * exp_so3(d.segment<3>(err::odometer)));
   x.odometer.T_BO.p += d.segment<3>(err::axle);
   x.odometer.time_offset += d(err::encoder_offset);
+  x.odometer.reading_error += d.segment<2>(err::readings);
   apply_local(x.camera.T_BC0, d.segment<3>(err::camera), d.segment<3>(err::camera + 3));
   apply_local(x.camera.T_C0C1, d.segment<3>(err::stereo), d.segment<3>(err::stereo + 3));
   for (int camera = 0; camera < 2; ++camera) {

@@ -23,18 +23,19 @@ inline const Eigen::Vector3d kGravity_W{0.0, 0.0, -9.81};  ///< [m/s^2]
 namespace err {
 inline constexpr int theta = 0, nu = 3, rho = 6, b_g = 9, b_a = 12;
 inline constexpr int imu_size = 15;
-inline constexpr int normal = imu_size;             ///< delta, tilt of the ground's normal [rad]: 2
-inline constexpr int wheel_radius = normal + 2;     ///< left, right, relative: 2
-inline constexpr int track_width = normal + 4;      ///< relative: 1
-inline constexpr int odometer = normal + 5;         ///< phi, turn of O about its own axes [rad]: 3
-inline constexpr int axle = odometer + 3;           ///< position of O in the body [m]: 3
-inline constexpr int encoder_offset = axle + 3;     ///< [s] of the encoders' clock: 1
-inline constexpr int beams = encoder_offset + 1;    ///< offset of each laser beam's range [m]
-inline constexpr int camera = beams + kMaxBeams;    ///< phi, p of camera 0 in the body: 6
-inline constexpr int stereo = camera + 6;           ///< phi, p of camera 1 in camera 0: 6
-inline constexpr int baseline = stereo + 3;         ///< its p
-inline constexpr int poses_size = 12;               ///< of these two
-inline constexpr int lenses = camera + poses_size;  ///< focal length, principal point of cameras 0 and 1: 3 each
+inline constexpr int normal = imu_size;              ///< delta, tilt of the ground's normal [rad]: 2
+inline constexpr int wheel_radius = normal + 2;      ///< left, right, relative: 2
+inline constexpr int track_width = normal + 4;       ///< relative: 1
+inline constexpr int odometer = normal + 5;          ///< phi, turn of O about its own axes [rad]: 3
+inline constexpr int axle = odometer + 3;            ///< position of O in the body [m]: 3
+inline constexpr int encoder_offset = axle + 3;      ///< [s] of the encoders' clock: 1
+inline constexpr int readings = encoder_offset + 1;  ///< what the last two of the encoders are off by [m]: 2
+inline constexpr int beams = readings + 2;           ///< offset of each laser beam's range [m]
+inline constexpr int camera = beams + kMaxBeams;     ///< phi, p of camera 0 in the body: 6
+inline constexpr int stereo = camera + 6;            ///< phi, p of camera 1 in camera 0: 6
+inline constexpr int baseline = stereo + 3;          ///< its p
+inline constexpr int poses_size = 12;                ///< of these two
+inline constexpr int lenses = camera + poses_size;   ///< focal length, principal point of cameras 0 and 1: 3 each
 inline constexpr int lens_size = 3;
 [[nodiscard]] constexpr int lens(int index) { return lenses + lens_size * index; }
 inline constexpr int time_offset = lenses + 2 * lens_size;  ///< [s]
@@ -90,6 +91,8 @@ struct OdometerState {
   double track_width = 1.0;                                ///< [m]
   Pose T_BO;                                               ///< middle of the axle to body
   double time_offset = 0.0;                                ///< [s] add to an encoder's stamp to get IMU time
+  /// By how much the last two readings are ahead of the path that the wheels have gone, the mean of both [m].
+  Eigen::Vector2d reading_error = Eigen::Vector2d::Zero();
   Eigen::Matrix<double, kMaxBeams, 1> beam_offset =
       Eigen::Matrix<double, kMaxBeams, 1>::Zero();  ///< of the laser beams: measured less true range [m]
 };
@@ -140,6 +143,12 @@ struct State {
 
   [[nodiscard]] int error_size() const { return err::clone(static_cast<int>(clones.size())); }
 };
+
+/// Standard deviations of the errors from err::b_g on: gyroscope [rad/s], accelerometer [m/s^2], each axis.
+[[nodiscard]] inline Eigen::Matrix<double, 6, 1> bias_sigma(double gyro, double accel) {
+  return (Eigen::Matrix<double, 6, 1>() << Eigen::Vector3d::Constant(gyro), Eigen::Vector3d::Constant(accel))
+      .finished();
+}
 
 /// Two unit vectors, as columns, that span the plane perpendicular to the unit vector n; smooth except at n = -z.
 [[nodiscard]] Eigen::Matrix<double, 3, 2> tangent_basis(const Eigen::Vector3d& n);

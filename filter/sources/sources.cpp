@@ -47,7 +47,7 @@ void Sources::look_at(const FeatureFrame& frame, TimeNs t_ns, const Ingest& inge
   standstill_.update({frame, t_ns, recent, gyro_bias(ekf), on_ground()});
   if (standstill_.stands()) imu_score_.add_rest(recent, imu_);
   ground_.set_gyro_bias(ekf.state().imu.b_g);
-  if (stood && !standstill_.stands() && ekf.running()) ekf.inflate_biases(kShakenGyro, kShakenAccel);
+  if (stood && !standstill_.stands() && ekf.running()) ekf.inflate(err::b_g, bias_sigma(kShakenGyro, kShakenAccel));
 }
 
 Displacements Sources::displacements(const FeatureFrame& frame, TimeNs t_ns, const Ingest& ingest, const Ekf& ekf,

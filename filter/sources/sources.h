@@ -31,6 +31,12 @@ class Sources {
     return event;
   }
 
+  /// Every increment, in time order: do the wheels rest, and how noisy are their readings?
+  void watch_wheels(const WheelIncrement& increment) {
+    standstill_.add(increment);
+    if (on_ground() && ground_.rolls_at(increment.from_ns)) wheels_->watch(increment);
+  }
+
   /// Does the image repeat the one before, of a vehicle that moves? It shows nothing of now then, and is none: so a
   /// driver makes a faster camera of a slow one. One that is stuck the health notices by its silence.
   [[nodiscard]] bool shows_nothing(const FeatureFrame& frame, const Ekf& ekf) const {

@@ -4,7 +4,6 @@
 
 #include "filter/ekf/so3.h"
 #include "filter/ingest/limits.h"
-#include "filter/sources/wheels/reading_noise.h"
 #include "filter/start/start_fit.h"
 #include "filter/start/start_sums.h"
 
@@ -13,10 +12,6 @@ namespace {
 
 constexpr double kSpeedSigma = 0.02;      // [m/s] chosen: the least of a speed
 constexpr double kDirectionSigma = 0.05;  // [rad] chosen: of the velocity in the body, which pitches about the axle
-
-double mean_speed(const WheelIncrement& turn, const Eigen::Vector2d& wheel_radius) {
-  return wheel_radius.dot(turn.angle) / (2.0 * turn.duration());
-}
 
 }  // namespace
 
@@ -32,13 +27,11 @@ Reason lacking_for_rolling_start(const ImuBuffer& imu, const Ring<WheelIncrement
 }
 
 StartAttempt rolling_start(const ImuBuffer& imu, const Ring<WheelIncrement>& turns, const OdometerState& odometer,
-                           const StartFit::Vector& prior_sigma, double stamp_sigma) {
+                           const StartFit::Vector& prior_sigma, double stamp_sigma, double shown_noise) {
   const TimeNs start_ns = turns.front().from_ns;
   StartFit fit(prior_sigma);
   StartSums sums;
   const double usual_dt = seconds_between(start_ns, turns.back().to_ns) / static_cast<double>(turns.size());
-  ReadingNoise readings;
-  for (std::size_t k = 0; k < turns.size(); ++k) readings.add(mean_speed(turns[k], odometer.wheel_radius), turns[k]);
   TimeNs now_ns = start_ns;
   for (std::size_t k = 0; k < turns.size(); ++k) {
     const WheelIncrement& turn = turns[k];
@@ -51,7 +44,8 @@ StartAttempt rolling_start(const ImuBuffer& imu, const Ring<WheelIncrement>& tur
                        });
     now_ns = middle_ns;
     const Eigen::Matrix3d& R_BO = odometer.T_BO.R;
-    const double speed = mean_speed(turn, odometer.wheel_radius) + odometer.wheel_radius.mean() * R_BO.col(1).dot(rate);
+    const double speed = odometer.wheel_radius.dot(turn.angle) / (2.0 * turn.duration()) +
+                         odometer.wheel_radius.mean() * R_BO.col(1).dot(rate);
     const Eigen::Vector3d u = sums.R * (speed * R_BO.col(0) - rate.cross(odometer.T_BO.p));
     StartFit::Rows H = StartFit::Rows::Zero();
     H.middleCols<3>(StartFit::velocity).setIdentity();
@@ -59,7 +53,7 @@ StartAttempt rolling_start(const ImuBuffer& imu, const Ring<WheelIncrement>& tur
     H.middleCols<3>(StartFit::gyro_bias) = sums.velocity_by_b_g + skew(u) * sums.R_by_b_g;
     H.middleCols<3>(StartFit::accel_bias) = sums.velocity_by_b_a();
     const Eigen::Vector3d z = u - sums.velocity;
-    const double stamps = std::max(std::sqrt(2.0) * stamp_sigma * std::abs(speed), readings.of_increment());
+    const double stamps = std::max(std::sqrt(2.0) * stamp_sigma * std::abs(speed), shown_noise);
     const double sigma =
         std::hypot(kSpeedSigma, kDirectionSigma * speed, stamps / std::sqrt(usual_dt * turn.duration()));
     fit.add(H, z, sigma * sigma);

@@ -18,10 +18,11 @@ namespace ear {
 ///   odometer's x
 /// It is a point to linearize at, not an estimate: the samples may be used again. It lacks wheels_contradict if the
 /// turns contradict the inertial samples, as they do in the air or on slipping wheels. They must be all that
-/// lacking_for_rolling_start() asks for. `stamp_sigma` [s]: of one reading of the wheels.
+/// lacking_for_rolling_start() asks for. `stamp_sigma` [s]: of one reading of the wheels, as stated; `shown_noise` [m]:
+/// of one turn, as they show it.
 [[nodiscard]] StartAttempt rolling_start(const ImuBuffer& imu, const Ring<WheelIncrement>& turns,
                                          const OdometerState& odometer, const StartFit::Vector& prior_sigma,
-                                         double stamp_sigma);
+                                         double stamp_sigma, double shown_noise);
 
 /// What the readings lack for a rolling start: Reason::none if the turns follow each other up to `now_ns` or shortly
 /// before, span `min_duration` [s], and the inertial samples reach back to the first.

@@ -69,7 +69,7 @@ std::optional<StartState> Start::find(const Situation& now, const Ingest& ingest
     if (lacks == Reason::none) {
       const StartAttempt attempt =
           rolling_start(ingest.imu(), turns, odometer_state(calibration_), start_sigma(config_.prior, calibration_),
-                        calibration_.encoder->stamp_sigma);
+                        calibration_.encoder->stamp_sigma, now.wheel_noise);
       lacks = attempt.lacks;
       if (attempt.x) start = in_motion(attempt);
     }

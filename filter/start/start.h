@@ -48,6 +48,7 @@ class Start {
     ImuStatistics recent;  ///< of the inertial samples
     bool stands = false;
     bool rolls = false;         ///< the wheels carry it
+    double wheel_noise = 0.0;   ///< [m] of one increment, as they show it
     bool lost = false;          ///< there is a state
     bool contradicted = false;  ///< which the cameras contradict
   };

@@ -237,7 +237,7 @@ TEST_CASE("ekf: inflated motion is about the body, inflated biases are each sens
   CHECK(grown.segment<3>(estimate_error::rotation).isApprox(Eigen::Vector3d::Constant(0.04), 1e-9));
   CHECK(grown.segment<3>(estimate_error::velocity).isApprox(Eigen::Vector3d::Constant(0.09), 1e-9));
   CHECK(grown.segment<3>(estimate_error::position).isApprox(Eigen::Vector3d::Constant(0.16), 1e-9));
-  ekf.inflate_biases(0.0, 0.5);
+  ekf.inflate(err::b_g, bias_sigma(0.0, 0.5));
   const Eigen::MatrixXd after = ekf.covariance().matrix();
   CHECK(after(err::b_g, err::b_g) == before(err::b_g, err::b_g));
   CHECK(after(err::b_a, err::b_a) == doctest::Approx(before(err::b_a, err::b_a) + 0.25));

@@ -7,6 +7,7 @@
 #include <functional>
 #include <random>
 
+#include "filter/sources/wheels/wheels.h"
 #include "tests/support/about.h"
 
 using namespace ear;
@@ -35,6 +36,54 @@ double shown(const std::function<double(double)>& path, double noise, double lat
     ++count;
   }
   return sum / count;
+}
+
+struct End {
+  double error = 0.0, sigma = 0.0;  // [m]
+};
+
+/// Along the path, a minute after it was known, at 0.5 m/s with a poor accelerometer, by readings that are off by
+/// `noise` [m] where nothing is stated. They had five seconds before to show it.
+End after_a_minute(double noise, std::uint64_t seed) {
+  constexpr double kSpeed = 0.5, kRadius = 0.1, kImuStep = 0.005, kKnown = 5.0, kEnd = 65.0;
+  const auto stamp = [](double t) { return 1'000'000'000 + static_cast<TimeNs>(std::llround(1e9 * t)); };
+  std::mt19937_64 rng{seed};
+  std::normal_distribution<double> normal;
+  Calibration calibration;
+  calibration.imu.accel_noise = 0.05;
+  calibration.encoder.emplace();
+  calibration.encoder->wheel_radius = {kRadius, kRadius};
+  calibration.encoder->rate_hz = kRate;
+  Ekf ekf(FilterConfig{}, calibration);
+  const auto path = [&](TimeNs t_ns) { return kSpeed * seconds_between(stamp(0.0), t_ns); };
+  const auto start = [&](double t) {
+    ImuState x;
+    x.t_ns = stamp(t);
+    x.p_WB.x() = path(x.t_ns);
+    x.v_W.x() = kSpeed;
+    ekf.start(x, Eigen::VectorXd::Constant(err::clones, 1e-9));
+  };
+  start(0.0);
+  ImuBuffer imu(16384);
+  for (double t = -0.1; t < kEnd + 0.1; t += kImuStep) {
+    const double accel = calibration.imu.accel_noise / std::sqrt(kImuStep) * normal(rng);
+    imu.push({stamp(t), Eigen::Vector3d::Zero(), {accel, 0.0, 9.81}});
+  }
+  Wheels wheels(OdometerConfig{}, calibration, false);
+  Records records;
+  double before = 0.0;
+  for (int i = 1; i < kEnd * kRate; ++i) {
+    const double t = i / kRate;
+    const double angle = (kSpeed * t + noise * normal(rng)) / kRadius;
+    const WheelIncrement turn{stamp(t - 1.0 / kRate), stamp(t), Eigen::Vector2d::Constant(angle - before)};
+    before = angle;
+    if (i == kKnown * kRate) start(t - 1.0 / kRate);
+    ekf.propagate(imu, middle_of(turn), {}, 0.0);
+    wheels.watch(turn);
+    wheels.update(turn, {imu}, ekf, records);
+  }
+  const ImuState& end = ekf.state().imu;
+  return {end.p_WB.x() - path(end.t_ns), std::sqrt(ekf.covariance().matrix()(err::rho, err::rho))};
 }
 
 double steady(double t) { return 0.5 * t; }
@@ -72,4 +121,18 @@ TEST_CASE("reading noise: after a gap it begins with what is known, and takes no
   CHECK(readings.of_increment() == 0.0);
   for (int i = 0; i < 100; ++i) add(i % 2 == 0 ? 0.6 : 0.4, 0);
   CHECK(readings.of_increment() > 0.0);
+}
+
+TEST_CASE("reading noise: however far the way, the path is as well known as a reading shows it, and as it says") {
+  constexpr double kNoise = 0.01;  // [m]
+  constexpr int kDrives = 20;
+  double squares = 0.0, relative = 0.0;
+  for (std::uint64_t seed = 1; seed <= kDrives; ++seed) {
+    const End end = after_a_minute(kNoise, seed);
+    squares += end.error * end.error / kDrives;
+    relative += std::pow(end.error / end.sigma, 2) / kDrives;
+  }
+  CHECK(std::sqrt(squares) < 1.5 * kNoise);
+  CHECK(relative > 0.4);
+  CHECK(relative < 2.0);
 }

@@ -142,6 +142,23 @@ TEST_CASE("wheels: Jacobians of every model are the derivatives") {
   }
 }
 
+TEST_CASE("wheels: what readings are off by counts at both ends of a turn") {
+  State x = simple_state();
+  x.imu.v_W = {0.5, 0.0, 0.0};
+  x.odometer.reading_error = {0.002, 0.003};  // at the beginning, at the end
+  WheelRows rows = rows_of(x, rims(0.6, 0.6), Eigen::Vector3d::Zero());
+  rows.count_readings(x.odometer, 1, 0.01);
+  CHECK(std::abs(rows.residual(WheelRows::speed)) < 1e-12);
+  const auto prediction = [&](const Eigen::VectorXd& d) -> Eigen::VectorXd {
+    State moved = x;
+    moved.odometer.reading_error += d;
+    WheelRows there = rows_of(moved, rims(0.6, 0.6), Eigen::Vector3d::Zero());
+    there.count_readings(moved.odometer, 1, 0.01);
+    return -there.residual;
+  };
+  check_jacobian(prediction, rows.H.middleCols<2>(ground_column(err::readings)));
+}
+
 TEST_CASE("encoder reader: differences, wrap either way, cumulative counts") {
   EncoderCalibration calibration;
   calibration.resolution = 1000;

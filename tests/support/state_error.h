@@ -66,6 +66,7 @@ namespace ear::test {
   d.segment<3>(err::odometer) = log_so3(estimate.odometer.T_BO.R.transpose() * truth.odometer.T_BO.R);
   d.segment<3>(err::axle) = truth.odometer.T_BO.p - estimate.odometer.T_BO.p;
   d(err::encoder_offset) = truth.odometer.time_offset - estimate.odometer.time_offset;
+  d.segment<2>(err::readings) = truth.odometer.reading_error - estimate.odometer.reading_error;
   d.segment<kMaxBeams>(err::beams) = truth.odometer.beam_offset - estimate.odometer.beam_offset;
   d.segment<6>(err::camera) = local_difference(truth.camera.T_BC0, estimate.camera.T_BC0);
   d.segment<6>(err::stereo) = local_difference(truth.camera.T_C0C1, estimate.camera.T_C0C1);

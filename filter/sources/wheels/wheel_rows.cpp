@@ -9,6 +9,13 @@ void WheelRows::measure_at(double lever) {
   J_gyro.row(speed) += lever * J_gyro.row(yaw_rate);
 }
 
+void WheelRows::count_readings(const OdometerState& odometer, int last, double duration) {
+  Eigen::RowVector2d J = Eigen::RowVector2d::Constant(-1.0 / duration);
+  J(last) = 1.0 / duration;
+  residual(speed) -= J.dot(odometer.reading_error);
+  H.block<1, 2>(speed, ground_column(err::readings)) = J;
+}
+
 WheelRows linearize_wheels(const State& x, const Eigen::Matrix3d& R_WB, const Eigen::Vector3d& v_W,
                            const WheelIncrement& turn, const Eigen::Vector3d& gyro_B, OdometerModel model,
                            bool normal_known) {

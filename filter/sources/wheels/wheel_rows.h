@@ -29,6 +29,10 @@ struct WheelRows {
   /// In place of the axle's middle, the speed is measured at this place on the axle, by the wheels and the gyroscope's
   /// yaw rate. `lever` [m]: half the track width is the right wheel alone, minus that the left one.
   void measure_at(double lever);
+
+  /// The readings at both ends of the turn are off by what the state says of them; `last` is the index of that at its
+  /// end, the other one is that at its beginning.
+  void count_readings(const OdometerState& odometer, int last, double duration);
 };
 
 /// The odometer's rows at a state that is `v_W` and `R_WB` at the middle of the turn; `gyro_B`: mean measured rate over

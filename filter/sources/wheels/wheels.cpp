@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <initializer_list>
+#include <utility>
 
 #include "filter/ekf/propagation.h"
 #include "filter/ingest/limits.h"
@@ -22,6 +23,12 @@ Wheels::Wheels(const OdometerConfig& config, const Calibration& calibration, boo
       sees_ground_(sees_ground),
       mounting_(config, *calibration.encoder) {}
 
+void Wheels::watch(const WheelIncrement& stamped) {
+  const Eigen::Vector2d rims(encoder_.wheel_radius[0] * stamped.angle(0), encoder_.wheel_radius[1] * stamped.angle(1));
+  path_noise_.add(rims.mean() / stamped.duration(), stamped);
+  turn_noise_.add((rims(1) - rims(0)) / (encoder_.track_width * stamped.duration()), stamped);
+}
+
 void Wheels::update(const WheelIncrement& stamped, const Context& context, Ekf& ekf, Records& records) {
   const State& x = ekf.state();
   const WheelIncrement increment = later_by(x.odometer.time_offset, stamped);
@@ -36,10 +43,10 @@ void Wheels::update(const WheelIncrement& stamped, const Context& context, Ekf& 
   // Wheels that rest show where they point by nothing but noise, and by what shakes the body on its springs.
   if (context.wheels_rest) rows.H = rows_at(Eigen::Vector3d::Zero(), x.imu.b_g).H;
   show_time_offset(rows, stamped, ekf);
-  path_noise_.add(rows.rim_speed, stamped);
-  turn_noise_.add(rows.turning, stamped);
-  Sigmas sigma =
+  const Noise noise =
       noise_of(rows, increment, rate, x, encoder_.rate_hz > 0.0 ? 1.0 / encoder_.rate_hz : increment.duration());
+  count_readings(rows, stamped, noise.reading, ekf);
+  Sigmas sigma = noise.rows;
   add_delay(sigma, increment, ekf);
   score_wheels(rows, sigma, increment, context, ekf, records);
 
@@ -53,10 +60,10 @@ void Wheels::update(const WheelIncrement& stamped, const Context& context, Ekf& 
       const Innovation innovation = ekf.test(rows.H.row(row), rows.residual(row), sigma(row));
       if (row == WheelRows::slope && !innovation.fits) running_.lifted_ns = increment.to_ns;
       NoiseScore& score = running_.row[static_cast<std::size_t>(row)];
-      const double noise = sigma(row);
-      sigma(row) *= std::sqrt(score.add(innovation, noise, config_.scores, increment.to_ns));
+      const double usual = sigma(row);
+      sigma(row) *= std::sqrt(score.add(innovation, usual, config_.scores, increment.to_ns));
       if (row == WheelRows::side && !context.stands) {
-        const double variance = innovation.variance + sigma(row) * sigma(row) - noise * noise;
+        const double variance = innovation.variance + sigma(row) * sigma(row) - usual * usual;
         sideways_.add(innovation.value, variance, increment.to_ns);
       }
       count(score, records.statistics);
@@ -73,9 +80,10 @@ void Wheels::count(const NoiseScore& score, FrameStatistics& statistics) {
 }
 
 /// What slips or bumps is white in the distance; the readings and the gyroscope add their own. Readings are as noisy as
-/// stated, or as they show if that is clearly more.
-Wheels::Sigmas Wheels::noise_of(const WheelRows& rows, const WheelIncrement& increment, const MeanRate& rate,
-                                const State& x, double usual_dt) const {
+/// stated, or as they show if that is clearly more. What they show, and what stamps are off by, the next reading takes
+/// back: of the path it is in the state. What is stated of counts is white: they may be sums of speeds.
+Wheels::Noise Wheels::noise_of(const WheelRows& rows, const WheelIncrement& increment, const MeanRate& rate,
+                               const State& x, double usual_dt) const {
   const double dt = increment.duration();
   const double per_root_metre = std::sqrt(std::abs(rows.wheel_speed) / dt);
   const double yaw_rate = x.imu.rate_B(rate.gyro_B).norm();
@@ -89,13 +97,14 @@ Wheels::Sigmas Wheels::noise_of(const WheelRows& rows, const WheelIncrement& inc
   const double stamp_noise = encoder_.stamp_sigma * std::sqrt(2.0) * per_interval;
   // On springs and tyres the body does not point along its path, and no laser shows by how much.
   const double sway = sees_ground_ ? 0.0 : std::abs(rows.wheel_speed) / std::sqrt(dt);  // [m/s] per [rad sqrt(s)]
-  const auto as_shown = [per_interval](double stated, const ReadingNoise& readings) {
-    const double shown = readings.of_increment() * per_interval;
-    return shown > kNoisy * stated ? shown : stated;
-  };
-  const double speed_noise = as_shown(std::hypot(count_noise, stamp_noise * rows.wheel_speed), path_noise_);
-  const double turn_noise =
-      as_shown(std::hypot(count_noise * 2.0 / x.odometer.track_width, stamp_noise * yaw_rate), turn_noise_);
+  const double stated_turn = std::hypot(count_noise * 2.0 / x.odometer.track_width, stamp_noise * yaw_rate);
+  const double shown_turn = turn_noise_.of_increment() * per_interval;
+  const double turn_noise = shown_turn > kNoisy * stated_turn ? shown_turn : stated_turn;
+  const double stated_path = std::hypot(count_noise, stamp_noise * rows.wheel_speed);
+  const bool noisy = path_noise_.of_increment() * per_interval > kNoisy * stated_path;
+  Noise noise;
+  noise.reading = noisy ? path_noise_.of_increment() / std::sqrt(2.0)
+                        : encoder_.stamp_sigma * std::abs(rows.rim_speed - rows.residual(WheelRows::speed));
   const auto root_sum = [&](int row, std::initializer_list<double> sigmas) {
     double variance = 0.0;
     for (const double s : sigmas) variance += s * s;
@@ -103,13 +112,22 @@ Wheels::Sigmas Wheels::noise_of(const WheelRows& rows, const WheelIncrement& inc
     return std::sqrt(variance + gyro * gyro);
   };
   const double floor = config_.speed_sigma;
-  Sigmas sigma;
-  sigma << root_sum(WheelRows::speed, {floor, config_.slip * per_root_metre, speed_noise}),
+  const double slip = config_.slip * per_root_metre;
+  noise.rows << root_sum(WheelRows::speed, {floor, slip, noisy ? 0.0 : count_noise}),
       root_sum(WheelRows::side,
                {floor, config_.side_slip * per_root_metre, config_.side_slip_turn * yaw_rate, config_.body_yaw * sway}),
       root_sum(WheelRows::slope, {floor, config_.roughness * per_root_metre, config_.body_pitch * sway}),
       root_sum(WheelRows::yaw_rate, {config_.yaw_rate_sigma, turn_noise});
-  return sigma;
+  return noise;
+}
+
+/// What a reading is off by, `sigma`, the next one takes back: the errors of the last two are in the state.
+void Wheels::count_readings(WheelRows& rows, const WheelIncrement& stamped, double sigma, Ekf& ekf) {
+  const int before = std::exchange(running_.reading, 1 - running_.reading);
+  if (stamped.from_ns != running_.read_ns) ekf.restart_reading(before, sigma);
+  ekf.restart_reading(running_.reading, sigma);
+  running_.read_ns = stamped.to_ns;
+  rows.count_readings(ekf.state().odometer, running_.reading, stamped.duration());
 }
 
 /// A reading of another moment shows the speed then. A yaw rate that changes is left out.
@@ -185,7 +203,9 @@ Displacement Wheels::displacement(const Ekf& ekf, const WheelIncrements& increme
   H.middleCols<3>(ground_column(err::nu)).setZero();  // the velocity is what they show
   Eigen::Matrix3d covariance =
       H * ekf.covariance().matrix().block<kGroundColumns, kGroundColumns>(err::nu, err::nu) * H.transpose();
-  covariance.diagonal() += noise_of(rows, whole, rate, x, dt).head<3>().cwiseAbs2();
+  const Noise noise = noise_of(rows, whole, rate, x, dt);
+  covariance.diagonal() += noise.rows.head<3>().cwiseAbs2();
+  covariance(WheelRows::speed, WheelRows::speed) += 2.0 * std::pow(noise.reading / dt, 2);
   const Eigen::Matrix3d J = dt * R_half * by_rows;
   result.p_BiBj = dt * R_half * v_B;
   result.covariance = J * covariance * J.transpose();

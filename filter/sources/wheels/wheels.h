@@ -25,6 +25,11 @@ class Wheels {
   /// The calibration has an encoder. `sees_ground`: there are lasers.
   Wheels(const OdometerConfig& config, const Calibration& calibration, bool sees_ground);
 
+  /// Every increment of wheels that carry the vehicle, also where there is no state: how noisy are the readings?
+  void watch(const WheelIncrement& stamped);
+  /// As they show themselves: standard deviation of an increment, of the mean of both wheels' paths [m].
+  [[nodiscard]] double shown_noise() const { return path_noise_.of_increment(); }
+
   /// What an update needs to know beside the readings.
   struct Context {
     const ImuBuffer& imu;
@@ -59,9 +64,15 @@ class Wheels {
   using Sigmas = Eigen::Matrix<double, WheelRows::size, 1>;
 
   [[nodiscard]] bool uses_plane() const { return config_.model == OdometerModel::terrain && sees_ground_; }
+  /// Standard deviations of the rows, and of what a reading is off by, which is in the state [m].
+  struct Noise {
+    Sigmas rows;
+    double reading = 0.0;
+  };
   /// `usual_dt` [s]: of increments like this one.
-  [[nodiscard]] Sigmas noise_of(const WheelRows& rows, const WheelIncrement& increment, const MeanRate& rate,
-                                const State& x, double usual_dt) const;
+  [[nodiscard]] Noise noise_of(const WheelRows& rows, const WheelIncrement& increment, const MeanRate& rate,
+                               const State& x, double usual_dt) const;
+  void count_readings(WheelRows& rows, const WheelIncrement& stamped, double sigma, Ekf& ekf);
   void show_time_offset(WheelRows& rows, const WheelIncrement& stamped, const Ekf& ekf);
   static void add_delay(Sigmas& sigma, const WheelIncrement& increment, const Ekf& ekf);
   void score_wheels(WheelRows& rows, Sigmas& sigma, const WheelIncrement& increment, const Context& context,
@@ -73,6 +84,8 @@ class Wheels {
     SpeedChange speed_change;                     ///< of the rims against the body, as the state predicts it
     std::array<NoiseScore, 2> wheel;              ///< left, right
     std::array<NoiseScore, WheelRows::size> row;  ///< of all but the speed, which is the wheels'
+    int reading = 0;                              ///< index of the last one in OdometerState::reading_error
+    std::optional<TimeNs> read_ns;                ///< its stamp
     std::optional<TimeNs> lifted_ns;              ///< when the velocity last did not lie in the ground
   };
 
