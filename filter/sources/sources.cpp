@@ -55,7 +55,7 @@ Displacements Sources::displacements(const FeatureFrame& frame, TimeNs t_ns, con
   motion_ = imu_motion(ekf.state().imu, ingest.imu(), t_ns, imu_);
   Displacements result;
   result[index_of(MotionSensor::imu)] = imu_displacement(motion_, ekf.covariance());
-  if (on_ground() && ground_.rolls_at(ekf.state().imu.t_ns)) {
+  if (rolls_at(ekf.state().imu.t_ns)) {
     result[index_of(MotionSensor::odometer)] =
         wheels_->displacement(ekf, ingest.increments(), ingest.imu(), t_ns, ground_known);
   }
@@ -81,7 +81,7 @@ void Sources::advance(TimeNs t_ns, const Advice& advice, Ingest& ingest, Ekf& ek
     if (bridge_ahead) continue;
     if (!z->increment) {
       ground_.update(z->ranges, ingest.imu(), camera_update_, ekf, records);
-    } else if (on_ground() && ground_.rolls_at(z->increment->from_ns)) {
+    } else if (rolls_at(z->increment->from_ns)) {
       wheels_->update(*z->increment,
                       {ingest.imu(), ground_.known(), advice.of(MotionSensor::odometer), camera_update_,
                        imu_score_.noise().gyro, standstill_.stands(), standstill_.wheels_rest(z->t_ns)},

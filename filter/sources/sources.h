@@ -34,7 +34,7 @@ class Sources {
   /// Every increment, in time order: do the wheels rest, and how noisy are their readings?
   void watch_wheels(const WheelIncrement& increment) {
     standstill_.add(increment);
-    if (on_ground() && ground_.rolls_at(increment.from_ns)) wheels_->watch(increment);
+    if (rolls_at(increment.from_ns)) wheels_->watch(increment);
   }
 
   /// Does the image repeat the one before, of a vehicle that moves? It shows nothing of now then, and is none: so a
@@ -75,6 +75,8 @@ class Sources {
 
  private:
   static void inflate_after_takeoff(Ekf& ekf);
+  /// Do wheels carry the vehicle, and for long enough that readings count?
+  [[nodiscard]] bool rolls_at(TimeNs t_ns) const { return wheels_ && ground_.rolls_at(t_ns); }
   [[nodiscard]] ImuNoiseFactors imu_noise(const Advice& advice) const;
   void hold(Ekf& ekf, Records& records);
 

@@ -9,9 +9,10 @@
 
 #include "filter/sources/wheels/wheels.h"
 #include "tests/support/about.h"
+#include "tests/support/hand_made_drive.h"
 
 using namespace ear;
-using ear::test::about;
+using namespace ear::test;
 
 namespace {
 
@@ -46,13 +47,10 @@ struct End {
 /// `noise` [m] where nothing is stated. They had five seconds before to show it.
 End after_a_minute(double noise, std::uint64_t seed) {
   constexpr double kSpeed = 0.5, kRadius = 0.1, kImuStep = 0.005, kKnown = 5.0, kEnd = 65.0;
-  const auto stamp = [](double t) { return 1'000'000'000 + static_cast<TimeNs>(std::llround(1e9 * t)); };
   std::mt19937_64 rng{seed};
   std::normal_distribution<double> normal;
-  Calibration calibration;
+  Calibration calibration = two_wheels(kRadius, 0.4);
   calibration.imu.accel_noise = 0.05;
-  calibration.encoder.emplace();
-  calibration.encoder->wheel_radius = {kRadius, kRadius};
   calibration.encoder->rate_hz = kRate;
   Ekf ekf(FilterConfig{}, calibration);
   const auto path = [&](TimeNs t_ns) { return kSpeed * seconds_between(stamp(0.0), t_ns); };

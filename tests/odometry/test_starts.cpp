@@ -402,12 +402,14 @@ TEST_CASE(
     double jitter;
     std::int64_t coarse;
     std::size_t imu_every;
+    bool jitter_known = false;
   };
   const std::vector<Sensors> all = {{"wheels 100 Hz, IMU 200 Hz", 1, 0.0, 1, 1},
                                     {"wheels 33 Hz", 3, 0.0, 1, 1},
                                     {"wheels 33 Hz, 512 counts", 3, 0.0, 512, 1},
                                     {"wheels 10 Hz", 10, 0.0, 1, 1},
                                     {"wheels 10 Hz, stamps off by 20 ms", 10, 0.02, 1, 1},
+                                    {"the same, as the calibration says", 10, 0.02, 1, 1, true},
                                     {"IMU 50 Hz", 1, 0.0, 1, 4},
                                     {"IMU 16 Hz, wheels 10 Hz", 10, 0.0, 1, 12}};
   for (const bool lasers : {true, false}) {
@@ -428,6 +430,7 @@ TEST_CASE(
           vehicle.lasers = lasers;
           vehicle.encoder_every = sensors.encoder_every;
           vehicle.encoder_jitter = sensors.jitter;
+          vehicle.jitter_known = sensors.jitter_known;
           vehicle.coarse = sensors.coarse;
           vehicle.imu_every = sensors.imu_every;
           const Outcome outcome = run(simulation, vehicle);

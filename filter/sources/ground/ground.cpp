@@ -80,7 +80,8 @@ void Ground::stand(const WheelIncrement& increment, const ImuBuffer& imu, Camera
   // The middle of the axle goes as far as the vehicle does, the wheels turn about it.
   const Eigen::Vector2d rims = x.odometer.wheel_radius.cwiseProduct(increment.angle);
   const double turned = 0.5 * std::abs(rims(1) - rims(0));
-  ekf.inflate(err::normal, Eigen::Vector2d::Constant(config_.normal_walk * std::sqrt(turned)));
+  const Eigen::Vector2d walk = Eigen::Vector2d::Constant(config_.normal_walk * std::sqrt(turned));
+  ekf.inflate(err::normal, walk);
   GroundRows z;
   for (const OdometerAxis axis : {OdometerAxis::forward, OdometerAxis::left}) {
     add_lean(z, predict_lean(x, R_WB, axis), config_.body_pitch / std::sqrt(increment.duration()));

@@ -35,9 +35,9 @@ WheelRows linearize_wheels(const State& x, const Eigen::Matrix3d& R_WB, const Ei
 
   WheelRows rows;
   rows.rim_speed = wheel.mean();
-  rows.turning = (wheel(1) - wheel(0)) / odometer.track_width;
+  const double turning = (wheel(1) - wheel(0)) / odometer.track_width;
   rows.wheel_speed = rows.rim_speed + (terrain ? r * y.dot(rate) : 0.0);  // (5)
-  rows.residual << rows.wheel_speed - f.dot(v_O), -y.dot(v_O), -n.dot(v_O), rows.turning - n.dot(rate);
+  rows.residual << rows.wheel_speed - f.dot(v_O), -y.dot(v_O), -n.dot(v_O), turning - n.dot(rate);
 
   // Derivatives of y, n, f by the state's errors.
   constexpr int nu = ground_column(err::nu), b_g = ground_column(err::b_g), normal = ground_column(err::normal);
@@ -80,7 +80,7 @@ WheelRows linearize_wheels(const State& x, const Eigen::Matrix3d& R_WB, const Ei
     H.block<1, 3>(WheelRows::speed, phi) -= r * rate.transpose() * y_phi;
   }
   H.block<1, 2>(WheelRows::yaw_rate, radius) << wheel(0) / odometer.track_width, -wheel(1) / odometer.track_width;
-  H(WheelRows::yaw_rate, track_width) = rows.turning;
+  H(WheelRows::yaw_rate, track_width) = turning;
   return rows;
 }
 

@@ -23,8 +23,10 @@ struct WheelRows {
   Eigen::Matrix<double, size, 3> J_gyro;  ///< of the prediction by the measured rate
   Eigen::Matrix3d direction;              ///< of speed, side and slope, in B
   double rim_speed = 0.0;                 ///< mean of both rims against the body [m/s]
-  double turning = 0.0;                   ///< yaw rate by their difference [rad/s]
   double wheel_speed = 0.0;               ///< forward speed that the wheels measure [m/s]
+
+  /// What the state predicts in place of `rim_speed`, until the row of the speed is changed by one of the below [m/s].
+  [[nodiscard]] double predicted_rim_speed() const { return rim_speed - residual(speed); }
 
   /// In place of the axle's middle, the speed is measured at this place on the axle, by the wheels and the gyroscope's
   /// yaw rate. `lever` [m]: half the track width is the right wheel alone, minus that the left one.

@@ -101,10 +101,10 @@ Wheels::Noise Wheels::noise_of(const WheelRows& rows, const WheelIncrement& incr
   const double shown_turn = turn_noise_.of_increment() * per_interval;
   const double turn_noise = shown_turn > kNoisy * stated_turn ? shown_turn : stated_turn;
   const double stated_path = std::hypot(count_noise, stamp_noise * rows.wheel_speed);
-  const bool noisy = path_noise_.of_increment() * per_interval > kNoisy * stated_path;
+  const double shown_path = path_noise_.of_increment();
+  const bool noisy = shown_path * per_interval > kNoisy * stated_path;
   Noise noise;
-  noise.reading = noisy ? path_noise_.of_increment() / std::sqrt(2.0)
-                        : encoder_.stamp_sigma * std::abs(rows.rim_speed - rows.residual(WheelRows::speed));
+  noise.reading = noisy ? shown_path / std::sqrt(2.0) : encoder_.stamp_sigma * std::abs(rows.predicted_rim_speed());
   const auto root_sum = [&](int row, std::initializer_list<double> sigmas) {
     double variance = 0.0;
     for (const double s : sigmas) variance += s * s;
@@ -132,10 +132,10 @@ void Wheels::count_readings(WheelRows& rows, const WheelIncrement& stamped, doub
 
 /// A reading of another moment shows the speed then. A yaw rate that changes is left out.
 void Wheels::show_time_offset(WheelRows& rows, const WheelIncrement& stamped, const Ekf& ekf) {
-  const double predicted = rows.rim_speed - rows.residual(WheelRows::speed);
   const Eigen::Matrix<double, 1, kGroundColumns> h = rows.H.row(WheelRows::speed);
   const double sigma = std::sqrt(ekf.covariance().variance(h, err::nu));
-  rows.H(WheelRows::speed, ground_column(err::encoder_offset)) = running_.speed_change.add(predicted, sigma, stamped);
+  rows.H(WheelRows::speed, ground_column(err::encoder_offset)) =
+      running_.speed_change.add(rows.predicted_rim_speed(), sigma, stamped);
 }
 
 /// A reading that the state has passed is compared with the velocity then, taken back by the inertial samples.
