@@ -128,6 +128,7 @@ FilterConfig settings_for(const FilterConfig& config, const Calibration& calibra
   prior.accel_bias = calibration.imu.accel_bias_sigma.value_or(prior.accel_bias);
   prior.gyro_scale = calibration.imu.gyro_scale_sigma.value_or(prior.gyro_scale);
   prior.gyro_unseen = calibration.imu.gyro_scale_sigma.value_or(prior.gyro_unseen);
+  prior.gyro_axes_unseen = calibration.imu.gyro_scale_sigma.value_or(prior.gyro_axes_unseen);
   prior.time_offset = calibration.camera_time_offset_sigma.value_or(prior.time_offset);
   const std::vector<CameraCalibration>& cameras = calibration.cameras;
   if (!cameras.empty()) state_pose(cameras[0].pose_sigma, prior.camera_rotation, prior.camera_position);

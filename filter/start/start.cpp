@@ -219,8 +219,9 @@ Eigen::VectorXd Start::sigma() const {
       sigma.segment<3>(err::stereo + 3) = (by_target.square() + prior.stereo_position * prior.stereo_position).sqrt();
     }
   }
-  Eigen::Matrix3d gyro = Eigen::Matrix3d::Constant(prior.gyro_scale);
-  if (calibration_.cameras.empty()) gyro.diagonal().setConstant(prior.gyro_unseen);
+  const bool unseen = calibration_.cameras.empty();
+  Eigen::Matrix3d gyro = Eigen::Matrix3d::Constant(unseen ? prior.gyro_axes_unseen : prior.gyro_scale);
+  if (unseen) gyro.diagonal().setConstant(prior.gyro_unseen);
   sigma.segment<9>(err::gyro_matrix) = gyro.reshaped();
   for (std::size_t i = 0; online.intrinsics && i < calibration_.cameras.size(); ++i) {
     sigma.segment<err::lens_size>(err::lens(static_cast<int>(i))) = lens_sigma(prior, calibration_.cameras[i]);

@@ -61,6 +61,7 @@ EnableFor<C, PriorConfig> visit(C& c, F&& f) {
   f("gyro_bias", c.gyro_bias);
   f("gyro_scale", c.gyro_scale);
   f("gyro_unseen", c.gyro_unseen);
+  f("gyro_axes_unseen", c.gyro_axes_unseen);
   f("accel_bias", c.accel_bias);
   f("camera_rotation", c.camera_rotation);
   f("camera_position", c.camera_position);

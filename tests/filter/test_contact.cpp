@@ -223,6 +223,31 @@ TEST_CASE("contact: no broken or obstructed beam fakes a take-off, or hides one"
   }
 }
 
+TEST_CASE("contact: the one beam that still sees the ground is enough for a take-off, and for none on the ground") {
+  for (std::size_t alone = 0; alone < 3; ++alone) {
+    CAPTURE(alone);
+    Drive drive;
+    drive.obstruction = [alone](LaserSample& sample) {
+      for (std::size_t beam = 0; beam < sample.range.size(); ++beam) {
+        if (beam != alone) sample.range[beam] = kNothing;
+      }
+    };
+    drive.speed = 0.5;
+    drive.run(3.0);
+    CHECK(drive.detector.mode() == ContactMode::ground);
+    CHECK(drive.events.empty());
+    drive.speed = 0.0;
+    const double lifts_off = drive.t();
+    for (int step = 0; step < 100; ++step) {  // at 1 m/s^2
+      drive.climb = 0.01 * step;
+      drive.run(0.01);
+    }
+    REQUIRE(drive.events.size() == 1);
+    CHECK(drive.events.front().what == ContactEvent::takeoff);
+    CHECK(drive.events.front().t - lifts_off < 0.45);  // within 10 cm
+  }
+}
+
 TEST_CASE("contact: no beam sees anything, and the mode stays, on the ground and in the air") {
   Drive drive;
   drive.run(1.0);

@@ -56,6 +56,7 @@ TEST_CASE("initial state: what is stated replaces the prior, the rest stays") {
   CHECK(prior.accel_bias == 0.017);
   CHECK(prior.gyro_scale == 0.022);
   CHECK(prior.gyro_unseen == 0.022);
+  CHECK(prior.gyro_axes_unseen == 0.022);
   CHECK(prior.encoder_time_offset == 0.023);
   for (const double rotation : {prior.odometer_rotation, prior.odometer_unseen}) CHECK(rotation == 0.018);
   for (const double position : {prior.axle, prior.axle_unseen}) CHECK(position == 0.019);

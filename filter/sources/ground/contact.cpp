@@ -84,13 +84,13 @@ void ContactDetector::roll(const WheelIncrement& increment) {
   level_ = std::clamp(level, -config_.touchdown_height, config_.touchdown_height);
 }
 
-/// There must be two beams that agree (one, where there is but one). Where not all agree, or the wheels rolled just
-/// now, the ground may be uneven.
+/// There must be two beams that agree (one, where but one sees anything). Where not all agree, or the wheels rolled
+/// just now, the ground may be uneven.
 bool ContactDetector::airborne(int agreeing) const {
   const bool all = agreeing == ground_->beams();
   const double unknown = all ? std::min(1.0, recent_distance_ / kOtherGround) : 1.0;
   const double tolerance = config_.takeoff_height + config_.unevenness * unknown;
-  return agreeing >= std::min(2, ground_->beams()) &&
+  return agreeing > 0 && agreeing >= std::min(2, ground_->beams_that_see()) &&
          ground_->height() - 2.0 * ground_->height_sigma() > level_ + tolerance;
 }
 

@@ -68,6 +68,7 @@ int GroundTracker::update(const LaserSample& sample) {
   for (std::size_t i = 0; i < count; ++i) {
     if (!usable(beams_[i], sample.range[i])) continue;
     ++readings;
+    beams_[i].usable_ns = sample.t_ns;
     const Eigen::Vector3d hit_B = lasers_.beams[i].p_BL + sample.range[i] * lasers_.beams[i].d_B - p_BO_;
     if (update_with_hit(beams_[i], lasers_.beams[i].d_B, hit_B)) ++agreeing;
   }
@@ -88,6 +89,13 @@ std::bitset<kMaxBeams> GroundTracker::stuck_beams() const {
   std::bitset<kMaxBeams> stuck;
   for (std::size_t i = 0; i < beams_.size(); ++i) stuck[i] = beams_[i].stuck();
   return stuck;
+}
+
+int GroundTracker::beams_that_see() const {
+  const auto sees = [this](const Beam& beam) {
+    return beam.usable_ns && seconds_between(*beam.usable_ns, *last_ns_) < kStreamGap;
+  };
+  return static_cast<int>(std::count_if(beams_.begin(), beams_.end(), sees));
 }
 
 /// 0 = n_B . hit + r + h, linear in the state. False if the beam is not used.

@@ -43,6 +43,7 @@ class GroundTracker {
   /// Beams that give the same range again and again.
   [[nodiscard]] std::bitset<kMaxBeams> stuck_beams() const;
   [[nodiscard]] int beams() const { return static_cast<int>(beams_.size()); }
+  [[nodiscard]] int beams_that_see() const;                    ///< that gave a range they may use, lately
   [[nodiscard]] double height() const { return x_(kHeight); }  ///< of the wheels above the plane [m]
   [[nodiscard]] double height_sigma() const;                   ///< [m]
   [[nodiscard]] double climb() const { return x_(kClimb); }    ///< [m/s]
@@ -56,9 +57,10 @@ class GroundTracker {
   /// Chosen: readings in a row that are equal, or agree again; noise makes two equal ones a chance of some percent.
   static constexpr int kNoChance = 5;
   struct Beam {
-    double last = 0.0;       ///< range [m]
-    int same = 0;            ///< readings in a row with this range
-    int agrees = kNoChance;  ///< readings in a row; a beam that disagreed is used again after some that agree
+    double last = 0.0;                ///< range [m]
+    int same = 0;                     ///< readings in a row with this range
+    int agrees = kNoChance;           ///< readings in a row; a beam that disagreed is used again after some that agree
+    std::optional<TimeNs> usable_ns;  ///< when its range last was one
     [[nodiscard]] bool stuck() const { return same >= kNoChance; }
   };
 
