@@ -76,7 +76,7 @@ void CommonEstimator::take_imu() {
   while (const std::optional<ImuSample> sample = ingest_.imu_clock().next()) {
     const ImuVerdict verdict = ingest_.judge(*sample, ekf_.running());
     if (!verdict.accepted) {
-      health_.add_refused_imu();
+      if (!verdict.repeated) health_.add_refused_imu();
       continue;
     }
     if (verdict.begins_anew) restart(sample->t_ns, verdict.clock_shift);

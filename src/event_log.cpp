@@ -27,6 +27,7 @@ std::string reasons(const StreamCounts& counts) {
   add(counts.not_later, "not later than the one before");
   add(counts.far_ahead, "far ahead");
   add(counts.too_late, "too late");
+  add(counts.repeated, "repeated");
   return text;
 }
 

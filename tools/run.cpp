@@ -128,6 +128,7 @@ void add_counts(RunSummary& summary, const std::string& stream, const StreamCoun
   add("_not_later", counts.not_later);
   add("_far_ahead", counts.far_ahead);
   add("_too_late", counts.too_late);
+  add("_repeated", counts.repeated);
   add("_gaps", counts.gaps);
 }
 

@@ -8,9 +8,6 @@
 namespace ear {
 namespace {
 
-// Chosen: of the deviation, between the samples of a spike, and between those before and after it; half a sine over
-// three samples differs by 0.4.
-constexpr double kAlike = 0.25;
 constexpr double kShortestStrike = 0.0125;  // [s] chosen: the samples around a strike, of 10 ms, are further apart
 
 /// What a line leaves of the integral over so many intervals of a random walk that is known at both ends, `q` being the

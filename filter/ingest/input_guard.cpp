@@ -42,6 +42,12 @@ ImuVerdict InputGuard::judge(const ImuSample& sample) {
     ++counts.implausible;
     return verdict;
   }
+  const bool later = !imu_stamps_.newest() || sample.t_ns > *imu_stamps_.newest();
+  if (later && imu_repeats_.repeats(sample)) {
+    ++counts.repeated;
+    verdict.repeated = true;
+    return verdict;
+  }
   const double step = imu_stamps_.newest() ? seconds_between(*imu_stamps_.newest(), sample.t_ns) : 0.0;
   const double refused = imu_stamps_.refused();
   const Stamp stamp = imu_stamps_.judge(sample.t_ns);

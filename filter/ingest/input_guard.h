@@ -8,6 +8,7 @@
 #include "ear/calibration.h"
 #include "ear/estimate.h"
 #include "ear/types.h"
+#include "filter/ingest/repeat_guard.h"
 #include "filter/ingest/stamp_guard.h"
 #include "filter/ingest/wheel_increment.h"
 
@@ -15,6 +16,7 @@ namespace ear {
 
 struct ImuVerdict {
   bool accepted = false;
+  bool repeated = false;     ///< refused: the driver had no new one, as if it had been lost
   bool begins_anew = false;  ///< after a gap of 2 s, or with another clock: where the vehicle is now nobody knows
   double interval = 0.0;     ///< [s] the usual one
   int lost = 0;              ///< samples between this one and the one before, by their usual interval
@@ -65,6 +67,7 @@ class InputGuard {
   std::size_t beam_count_;
   InputCounts counts_;
   StampGuard imu_stamps_;
+  RepeatGuard imu_repeats_;
   std::optional<TimeNs> last_encoder_ns_;  ///< the newest reading accepted
   std::optional<TimeNs> last_laser_ns_;    ///< the same
   FeatureFrame plausible_frame_;

@@ -44,7 +44,11 @@ inline constexpr double kFarthest = 100.0;
 /// Chosen: times the usual or stated noise; less may be chance.
 inline constexpr double kNoisy = 1.25;
 inline constexpr double kClear = 4.0;  ///< chosen: so many standard deviations are not chance
-inline constexpr int kToKnow = 20;     ///< chosen: a mean of so many is known, whatever their rate
+/// Chosen: of what samples differ by from others: among themselves they are alike. In a spike, and before and after it;
+/// half a sine over three samples differs by 0.4. Of steps in a row, and of how many: of those of real sensors a third
+/// and more are unlike the one before.
+inline constexpr double kAlike = 0.25;
+inline constexpr int kToKnow = 20;  ///< chosen: a mean of so many is known, whatever their rate
 /// Chosen: so many samples in a row confirm each other; one may have a false stamp.
 inline constexpr int kConfirmed = 3;
 /// Chosen: fewer features show too little of where the vehicle is, or of how it moved.

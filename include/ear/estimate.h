@@ -98,9 +98,12 @@ struct StreamCounts {
   std::uint64_t not_later = 0;    ///< a duplicate, or earlier than the sample before
   std::uint64_t far_ahead = 0;    ///< a stamp far ahead of the others that nothing confirms
   std::uint64_t too_late = 0;     ///< so far behind the state that it cannot be used any more
-  std::uint64_t gaps = 0;         ///< gaps in what was accepted; not a refusal
+  std::uint64_t repeated = 0;  ///< the last sample again, more often in a row than by chance: the driver has no new one
+  std::uint64_t gaps = 0;      ///< gaps in what was accepted; not a refusal
 
-  [[nodiscard]] std::uint64_t rejected() const { return not_finite + implausible + not_later + far_ahead + too_late; }
+  [[nodiscard]] std::uint64_t rejected() const {
+    return not_finite + implausible + not_later + far_ahead + too_late + repeated;
+  }
 };
 
 /// What was refused or bridged since the start: no sample is dropped without being counted. How far the samples

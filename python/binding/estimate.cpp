@@ -48,7 +48,7 @@ void bind_counts(py::module_& module) {
   bind_value(module, "StreamCounts", "What one stream delivered.", Field{"accepted", &S::accepted},
              Field{"not_finite", &S::not_finite}, Field{"implausible", &S::implausible},
              Field{"not_later", &S::not_later}, Field{"far_ahead", &S::far_ahead}, Field{"too_late", &S::too_late},
-             Field{"gaps", &S::gaps})
+             Field{"repeated", &S::repeated}, Field{"gaps", &S::gaps})
       .def_property_readonly("rejected", &S::rejected);
   using I = InputCounts;
   bind_value(module, "InputCounts", "What was refused or bridged since the start.", Field{"imu", &I::imu},

@@ -181,6 +181,16 @@ def bursts(rows):
     return kept
 
 
+def repeated_samples(rows):
+    """As a driver that hangs: half a second in ten."""
+    begin, held = int(rows[0][0]) + 3 * 10**9, None
+    for row in rows:
+        hangs = int(row[0]) >= begin and (int(row[0]) - begin) % 10**10 < 5 * 10**8
+        held = (held or row[1:]) if hangs else None
+        row[1:] = held or row[1:]
+    return rows
+
+
 def lost_readings(rows):
     draws = random.Random(5)
     return [row for row in rows if draws.random() > 0.3]
@@ -271,6 +281,7 @@ ALTERATIONS = [
     Alteration("imu_rate", "the same, and sensor.yaml states the rate of all", on(["imu0"], every(4))),
     Alteration("imu_lost", "a tenth of the inertial samples lost, at random", lost_samples),
     Alteration("imu_bursts", "inertial samples lost eight times a second, for up to 0.1 s", on(["imu0"], bursts)),
+    Alteration("imu_frozen", "inertial samples repeat for half a second, every ten", on(["imu0"], repeated_samples)),
     Alteration("imu_late", "stamps of the inertial samples 20 ms late", on(["imu0"], later(0.02))),
     Alteration("imu_very_late", "the same by 100 ms", on(["imu0"], later(0.1))),
     Alteration("imu_noise", "white noise of 0.05 rad/s and 0.5 m/s^2 on each sample", noisy_imu),
