@@ -19,7 +19,8 @@ void RepeatGuard::learn(const Values& step) {
 /// Is there noise in any axis? Where there is none, as in a simulation, samples repeat at rest.
 bool RepeatGuard::noisy() const { return rough_.maxCoeff() > kAlike; }
 
-/// What a run says of all this counts after it. No chance is what is that of kClear standard deviations in both sensors.
+/// What a run says of all this counts after it. No chance is what is that of kClear standard deviations in both
+/// sensors.
 bool RepeatGuard::repeats(const ImuSample& sample) {
   Values values;
   values << sample.gyro_B, sample.accel_B;

@@ -72,6 +72,8 @@ const std::vector<StereoMatch>& Cameras::matches_with(const FeatureFrame& frame,
   return matches_.find(last_features_, frame, cameras);
 }
 
+/// The features that show the motion count again when their tracks end: here they count a sixteenth, and still bring
+/// the state to where it is linear.
 bool Cameras::bridge(const FeatureFrame& frame, Ekf& ekf) {
   const State& x = ekf.state();
   const std::optional<Pose> before = image_pose(x);
@@ -80,18 +82,18 @@ bool Cameras::bridge(const FeatureFrame& frame, Ekf& ekf) {
       stereo_motion(matches_with(frame, x.camera), x.camera, motion_since(*before, x.imu), frame_check_.sigma());
   if (!motion) return false;
   const Eigen::Matrix3d R_WB0 = x.clones.back().T_WB.R;
-  const Eigen::Matrix3d covariance = R_WB0 * motion->p_covariance() * R_WB0.transpose() +
-                                     kBridgePosition * kBridgePosition * Eigen::Matrix3d::Identity();
-  const Eigen::LLT<Eigen::Matrix3d> llt(covariance);
+  Eigen::Matrix<double, 6, 6> to_world = Eigen::Matrix<double, 6, 6>::Zero();  // the fit's turn is in the later body
+  to_world.topLeftCorner<3, 3>() = R_WB0 * motion->T_B0B1.R;
+  to_world.bottomRightCorner<3, 3>() = R_WB0;
+  Eigen::Matrix<double, 6, 6> covariance = kClear * kClear * to_world * motion->covariance * to_world.transpose();
+  covariance.diagonal().head<3>().array() += kSeenTurn * kSeenTurn;
+  covariance.diagonal().tail<3>().array() += kBridgePosition * kBridgePosition;
+  const Eigen::LLT<Eigen::Matrix<double, 6, 6>> llt(covariance);
   auto H = rows_.topLeftCorner(6, x.error_size());
   Eigen::Matrix<double, 6, 1> r;
   linearize_relative_motion(x, motion->T_B0B1, H, r);
-  H.topRows<3>() /= kSeenTurn;
-  r.head<3>() /= kSeenTurn;
-  auto H_position = H.bottomRows<3>();
-  auto r_position = r.tail<3>();
-  llt.matrixL().solveInPlace(H_position);
-  llt.matrixL().solveInPlace(r_position);
+  llt.matrixL().solveInPlace(H);
+  llt.matrixL().solveInPlace(r);
   ekf.apply(H, 0, r, CameraUpdate::considered);
   return true;
 }

@@ -42,7 +42,7 @@ class StereoMatches {
 
 /// [standard deviations] chosen: from where an observation weighs less.
 inline constexpr double kHuber = 2.0;
-/// [rad] chosen: standard deviation of a turn between two images, whatever the fit's covariance is.
+/// [rad] chosen: standard deviation of a turn between two images, besides the fit's.
 inline constexpr double kSeenTurn = 2e-3;
 
 /// The motion from frame 0 to frame 1.
