@@ -156,7 +156,7 @@ class Hop(unittest.TestCase):
         "imu_spikes": 0.012,
         "camera_repeated": 0.015,
         "camera_late": 0.015,  # of 50 ms, 25 standard deviations
-        "imu_frozen": None,  # half a second of a hop that nothing measures; 12 % of false tracking where samples that repeat count
+        "imu_frozen": None,  # half a second of a hop that nothing measures, and the health knows it
         "imu_very_late": None,  # too wrong for an estimate, and the health knows it
         "cameras_exchanged": None,
     }

@@ -90,7 +90,7 @@ bool ContactDetector::airborne(int agreeing) const {
   const bool all = agreeing == ground_->beams();
   const double unknown = all ? std::min(1.0, recent_distance_ / kOtherGround) : 1.0;
   const double tolerance = config_.takeoff_height + config_.unevenness * unknown;
-  return agreeing > 0 && agreeing >= std::min(2, ground_->beams_that_see()) &&
+  return agreeing >= std::clamp(ground_->beams_that_see(), 1, 2) &&
          ground_->height() - 2.0 * ground_->height_sigma() > level_ + tolerance;
 }
 

@@ -25,7 +25,9 @@ struct WheelRows {
   double rim_speed = 0.0;                 ///< mean of both rims against the body [m/s]
   double wheel_speed = 0.0;               ///< forward speed that the wheels measure [m/s]
 
-  /// What the state predicts in place of `rim_speed`, until the row of the speed is changed by one of the below [m/s].
+  /// What the state predicts in place of `wheel_speed` and of `rim_speed`, until the row of the speed is changed by one
+  /// of the below [m/s].
+  [[nodiscard]] double predicted_speed() const { return wheel_speed - residual(speed); }
   [[nodiscard]] double predicted_rim_speed() const { return rim_speed - residual(speed); }
 
   /// In place of the axle's middle, the speed is measured at this place on the axle, by the wheels and the gyroscope's

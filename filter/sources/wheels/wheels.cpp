@@ -97,8 +97,7 @@ Wheels::Noise Wheels::noise_of(const WheelRows& rows, const WheelIncrement& incr
   const double stamp_noise = encoder_.stamp_sigma * std::sqrt(2.0) * per_interval;
   // On springs and tyres the body does not point along its path, and no laser shows by how much. Readings that are late
   // or repeat do not show how fast it goes, nor does a state that does not know yet.
-  const double predicted_speed = rows.wheel_speed - rows.residual(WheelRows::speed);
-  const double goes = std::max(std::abs(rows.wheel_speed), std::abs(predicted_speed));
+  const double goes = std::max(std::abs(rows.wheel_speed), std::abs(rows.predicted_speed()));
   const double sway = sees_ground_ ? 0.0 : goes / std::sqrt(dt);  // [m/s] per [rad sqrt(s)]
   const double stated_turn = std::hypot(count_noise * 2.0 / x.odometer.track_width, stamp_noise * yaw_rate);
   const double shown_turn = turn_noise_.of_increment() * per_interval;
