@@ -200,12 +200,14 @@ void Ekf::inflate_motion(double rotation, double velocity, double position) {
   covariance_.inflate(err::theta, Q);
 }
 
-/// One unknown for all of it, along what the state does.
+/// One unknown for turn and velocity, along what the state does. How far the vehicle came has its own: it is known by
+/// the velocity if samples were lost, and then what shows another turn shows no other place.
 void Ekf::inflate_time(double seconds) {
   const ImuState& x = state_.imu;
   const Eigen::Vector3d rate_W = x.R_WB * last_.rate_B;
-  Eigen::Matrix<double, 9, 1> J;
-  J << rate_W, last_.accel_W + x.v_W.cross(rate_W), x.v_W + x.p_WB.cross(rate_W);
+  Eigen::Matrix<double, 9, 2> J = Eigen::Matrix<double, 9, 2>::Zero();
+  J.col(0) << rate_W, last_.accel_W + x.v_W.cross(rate_W), x.p_WB.cross(rate_W);
+  J.col(1).tail<3>() = x.v_W;
   covariance_.inflate(err::theta, Eigen::Matrix<double, 9, 9>(seconds * seconds * J * J.transpose()));
 }
 

@@ -88,7 +88,7 @@ class Ekf {
   /// The vehicle may be turned, faster and elsewhere by these standard deviations [rad, m/s, m], each axis, whatever
   /// was measured so far.
   void inflate_motion(double rotation, double velocity, double position);
-  /// By that of the time that passed [s].
+  /// By that of the time that passed [s]: turn and velocity by one unknown, the place by another.
   void inflate_time(double seconds);
   /// The entries from `first` on may be elsewhere by these standard deviations besides, each by itself.
   void inflate(int first, const Eigen::Ref<const Eigen::VectorXd>& sigma);

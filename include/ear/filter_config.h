@@ -39,7 +39,7 @@ struct PriorConfig {
   double wheel_scale = 5e-2;          ///< of both wheels alike, relative, where neither camera nor lasers exist
   double track_width = 5e-3;          ///< relative
   double odometer_rotation = 5e-3;    ///< [rad] odometer in the body
-  double odometer_unseen = 2e-2;      ///< [rad] the same without lasers, where it is what was guessed
+  double odometer_unseen = 4e-2;      ///< [rad] the same without lasers, where it is what was guessed
   double axle = 3e-3;                 ///< [m] middle of the axle in the body
   double axle_unseen = 0.1;           ///< [m] the same without lasers
   double encoder_time_offset = 2e-3;  ///< [s] encoders against IMU

@@ -4,6 +4,7 @@
 
 #include <random>
 
+#include "tests/support/about.h"
 #include "tests/support/check_jacobian.h"
 #include "tests/support/random_state.h"
 #include "tests/support/state_error.h"
@@ -36,6 +37,17 @@ WheelIncrement rims(double left, double right) {
 WheelRows rows_of(const State& x, const WheelIncrement& turn, const Eigen::Vector3d& gyro_B,
                   OdometerModel model = OdometerModel::terrain, bool normal_known = true) {
   return linearize_wheels(x, x.imu.R_WB, x.imu.v_W, turn, gyro_B, model, normal_known);
+}
+
+/// As it is where side and slope fit: along the path.
+State along_path(State x, const Eigen::Vector3d& gyro_B, OdometerModel model, bool normal_known) {
+  const OdometerState& odometer = x.odometer;
+  const bool on_plane = model == OdometerModel::terrain && normal_known;
+  const Eigen::Vector3d n =
+      on_plane ? Eigen::Vector3d(x.imu.R_WB.transpose() * x.ground.n_W) : Eigen::Vector3d(odometer.T_BO.R.col(2));
+  const Eigen::Vector3d path = odometer.T_BO.R.col(1).cross(n).normalized();
+  x.imu.v_W = x.imu.R_WB * (0.7 * path - x.imu.rate_B(gyro_B).cross(odometer.T_BO.p));
+  return x;
 }
 
 Eigen::Matrix3d pitched(double nose_down) { return exp_so3({0.0, nose_down, 0.0}); }
@@ -97,8 +109,9 @@ TEST_CASE("wheels: the wheel that rolls and the gyroscope tell the speed when th
 TEST_CASE("wheels: the Jacobian of one wheel is the derivative, and knows nothing of the other's radius") {
   std::mt19937_64 rng{52};
   const WheelIncrement turn = rims(0.4, 0.55);
-  const State x = random_state(rng, 0);
+  State x = random_state(rng, 0);
   const Eigen::Vector3d gyro_B = random_vector(rng, 0.5);
+  x = along_path(x, gyro_B, OdometerModel::gyro, true);
   const double lever = 0.5 * x.odometer.track_width;
   WheelRows rows = rows_of(x, turn, gyro_B, OdometerModel::gyro);
   rows.measure_at(lever);
@@ -122,8 +135,9 @@ TEST_CASE("wheels: Jacobians of every model are the derivatives") {
   WheelIncrement turn = rims(0.4, 0.55);
   for (const bool normal_known : {true, false}) {
     for (const OdometerModel model : {OdometerModel::terrain, OdometerModel::gyro}) {
-      const State x = random_state(rng, 0);
+      State x = random_state(rng, 0);
       const Eigen::Vector3d gyro_B = random_vector(rng, 0.5);
+      x = along_path(x, gyro_B, model, normal_known);
       const WheelRows rows = rows_of(x, turn, gyro_B, model, normal_known);
       const auto prediction = [&](const Eigen::VectorXd& part) -> Eigen::VectorXd {
         Eigen::VectorXd d = Eigen::VectorXd::Zero(x.error_size());
@@ -140,6 +154,60 @@ TEST_CASE("wheels: Jacobians of every model are the derivatives") {
       check_jacobian(by_rate, rows.J_gyro);
     }
   }
+}
+
+TEST_CASE("wheels: an error of the velocity across the path shows nothing of where the wheels point") {
+  std::mt19937_64 rng{53};
+  const WheelIncrement turn = rims(0.4, 0.55);
+  const Eigen::Vector3d gyro_B = random_vector(rng, 0.5);
+  for (const bool normal_known : {true, false}) {
+    State x = along_path(random_state(rng, 0), gyro_B, OdometerModel::terrain, normal_known);
+    const WheelRows along = rows_of(x, turn, gyro_B, OdometerModel::terrain, normal_known);
+    x.imu.v_W += x.imu.R_WB * along.direction.transpose().rightCols<2>() * Eigen::Vector2d(0.3, -0.2);
+    const WheelRows off = rows_of(x, turn, gyro_B, OdometerModel::terrain, normal_known);
+    CHECK((off.residual - along.residual).norm() > 0.2);
+    CHECK((off.H - along.H).norm() < 1e-12);
+  }
+}
+
+TEST_CASE("wheels: what the first order leaves out of the speed is as large as many draws say") {
+  std::mt19937_64 rng{54};
+  const WheelIncrement turn = rims(0.4, 0.55);
+  State x = random_state(rng, 0);
+  const Eigen::Vector3d gyro_B = x.imu.b_g;  // it does not turn
+  x = along_path(x, gyro_B, OdometerModel::gyro, true);
+  // A velocity that was learned along a direction that is not known, and errors of its own.
+  const double speed = x.imu.v_W.norm();
+  Eigen::Matrix<double, 6, 6> root = Eigen::Matrix<double, 6, 6>::Zero();  // of phi and nu
+  root.topLeftCorner<3, 3>() = 0.05 * Eigen::Matrix3d::Identity();
+  root.bottomLeftCorner<3, 3>() = -0.02 * speed * x.imu.R_WB * x.odometer.T_BO.R * skew(Eigen::Vector3d::UnitX());
+  root.bottomRightCorner<3, 3>() = 0.03 * Eigen::Matrix3d::Identity();
+  const Eigen::Matrix<double, 6, 6> P = root * root.transpose();
+  const auto speed_at = [&](const Eigen::Matrix<double, 6, 1>& error) {
+    Eigen::VectorXd d = Eigen::VectorXd::Zero(x.error_size());
+    d.segment<3>(err::odometer) = error.head<3>();
+    d.segment<3>(err::nu) = error.tail<3>();
+    return -rows_of(with_error(x, d), turn, gyro_B, OdometerModel::gyro).residual(WheelRows::speed);
+  };
+  const Eigen::Matrix<double, 1, kGroundColumns> H =
+      rows_of(x, turn, gyro_B, OdometerModel::gyro).H.row(WheelRows::speed);
+  const double predicted = speed_at(Eigen::Matrix<double, 6, 1>::Zero());
+  constexpr int kDraws = 20000;
+  double squares = 0.0;
+  for (int draw = 0; draw < kDraws; ++draw) {
+    Eigen::Matrix<double, 6, 1> white;
+    white << random_vector(rng, 1.0), random_vector(rng, 1.0);
+    const Eigen::Matrix<double, 6, 1> error = root * white;
+    // The turn alone bends the direction too: that is no error of the velocity.
+    Eigen::Matrix<double, 6, 1> turned = error;
+    turned.tail<3>().setZero();
+    const double bent = speed_at(turned) - predicted;
+    const double linear = H.segment<3>(ground_column(err::nu)).dot(error.tail<3>());
+    squares += std::pow(speed_at(error) - predicted - linear - bent, 2) / kDraws;
+  }
+  const double expected = speed_left_out(x.imu.R_WB * x.odometer.T_BO.R, P.topLeftCorner<3, 3>(),
+                                         P.topRightCorner<3, 3>(), P.bottomRightCorner<3, 3>());
+  CHECK(squares == about(expected, 0.05));
 }
 
 TEST_CASE("wheels: what readings are off by counts at both ends of a turn") {

@@ -98,6 +98,11 @@ bool Cameras::bridge(const FeatureFrame& frame, Ekf& ekf) {
   return true;
 }
 
+void Cameras::forget(Ekf& ekf) {
+  while (!ekf.state().clones.empty()) ekf.marginalise(0);
+  tracks_.clear();
+}
+
 FrameAgreement Cameras::compare(const FeatureFrame& frame, const Ekf& ekf) {
   FrameAgreement agreement;
   compared_.agrees = true;

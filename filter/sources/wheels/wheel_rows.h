@@ -42,8 +42,15 @@ struct WheelRows {
 /// The odometer's rows at a state that is `v_W` and `R_WB` at the middle of the turn; `gyro_B`: mean measured rate over
 /// the turn, bias included. With OdometerModel::terrain: (5) with the body's pitch rate, direction along the ground
 /// (6)-(8); otherwise along the body, without it. `normal_known`: false without lasers: the ground is O's own xy-plane.
+/// Derivatives by the directions are those at a velocity along the path, where the rows of side and slope are zero:
+/// what the state's velocity has across is its error.
 [[nodiscard]] WheelRows linearize_wheels(const State& x, const Eigen::Matrix3d& R_WB, const Eigen::Vector3d& v_W,
                                          const WheelIncrement& turn, const Eigen::Vector3d& gyro_B, OdometerModel model,
                                          bool normal_known);
+
+/// What they leave out of the speed where the wheels' forward is the odometer's: the error of that direction times that
+/// of the velocity. Its mean square [m^2/s^2], of the covariances of phi, of phi with nu, and of nu.
+[[nodiscard]] double speed_left_out(const Eigen::Matrix3d& R_WO, const Eigen::Matrix3d& phi,
+                                    const Eigen::Matrix3d& phi_nu, const Eigen::Matrix3d& nu);
 
 }  // namespace ear

@@ -47,6 +47,7 @@ void Wheels::update(const WheelIncrement& stamped, const Context& context, Ekf& 
       noise_of(rows, increment, rate, x, encoder_.rate_hz > 0.0 ? 1.0 / encoder_.rate_hz : increment.duration());
   count_readings(rows, stamped, noise.reading, ekf);
   Sigmas sigma = noise.rows;
+  add_left_out(sigma, motion.R_WB, increment, ekf);
   add_delay(sigma, increment, ekf);
   score_wheels(rows, sigma, increment, context, ekf, records);
 
@@ -138,6 +139,18 @@ void Wheels::show_time_offset(WheelRows& rows, const WheelIncrement& stamped, co
   const double sigma = std::sqrt(ekf.covariance().variance(h, err::nu));
   rows.H(WheelRows::speed, ground_column(err::encoder_offset)) =
       running_.speed_change.add(rows.predicted_rim_speed(), sigma, stamped);
+}
+
+/// It is no white noise: readings of a moment share it.
+void Wheels::add_left_out(Sigmas& sigma, const Eigen::Matrix3d& R_WB, const WheelIncrement& increment,
+                          const Ekf& ekf) const {
+  if (sees_ground_) return;
+  const auto P = ekf.covariance().matrix();
+  const double variance =
+      speed_left_out(R_WB * ekf.state().odometer.T_BO.R, P.block<3, 3>(err::odometer, err::odometer),
+                     P.block<3, 3>(err::odometer, err::nu), P.block<3, 3>(err::nu, err::nu));
+  const double readings = std::max(1.0, kStreamGap / increment.duration());
+  sigma(WheelRows::speed) = std::hypot(sigma(WheelRows::speed), std::sqrt(readings * variance));
 }
 
 /// A reading that the state has passed is compared with the velocity then, taken back by the inertial samples.

@@ -74,6 +74,7 @@ class Wheels {
                                const State& x, double usual_dt) const;
   void count_readings(WheelRows& rows, const WheelIncrement& stamped, double sigma, Ekf& ekf);
   void show_time_offset(WheelRows& rows, const WheelIncrement& stamped, const Ekf& ekf);
+  void add_left_out(Sigmas& sigma, const Eigen::Matrix3d& R_WB, const WheelIncrement& increment, const Ekf& ekf) const;
   static void add_delay(Sigmas& sigma, const WheelIncrement& increment, const Ekf& ekf);
   void score_wheels(WheelRows& rows, Sigmas& sigma, const WheelIncrement& increment, const Context& context,
                     const Ekf& ekf, Records& records);
