@@ -117,23 +117,15 @@ void Sources::propagate(TimeNs t_ns, const Advice& advice, Ingest& ingest, Ekf& 
 FrameAgreement Sources::check(const FeatureFrame& frame, Ingest& ingest, Ekf& ekf) {
   FrameAgreement seen;
   if (ekf.running()) {
-    if (ingest.interruption().take_uncertain()) cross(frame, ingest.interruption(), ekf);
+    if (ingest.interruption().take_uncertain() && cameras_.bridge(frame, ekf)) {
+      camera_update_ = CameraUpdate::considered;
+      ingest.interruption().set_bridged(ekf.state().imu.t_ns);
+    }
+    clone_is_here_ = clone_is_here_ && !ekf.state().clones.empty();
     seen = cameras_.compare(frame, ekf);
   }
   seen.right_skipped = frame.right_skipped;
   return seen;
-}
-
-/// Two images that are too unlike to show the motion have few features in common, by which a state that is far off
-/// learns to be elsewhere.
-void Sources::cross(const FeatureFrame& frame, ImuInterruption& interruption, Ekf& ekf) {
-  if (cameras_.bridge(frame, ekf)) {
-    camera_update_ = CameraUpdate::considered;
-    interruption.set_bridged(ekf.state().imu.t_ns);
-  } else if (cameras_.count() > 1) {
-    cameras_.forget(ekf);
-    clone_is_here_ = false;
-  }
 }
 
 /// A vehicle that moves on without an image leaves no clone.

@@ -79,8 +79,6 @@ class Sources {
   [[nodiscard]] bool rolls_at(TimeNs t_ns) const { return wheels_ && ground_.rolls_at(t_ns); }
   [[nodiscard]] ImuNoiseFactors imu_noise(const Advice& advice) const;
   void hold(Ekf& ekf, Records& records);
-  /// An interruption of the inertial samples, which ended at this frame.
-  void cross(const FeatureFrame& frame, ImuInterruption& interruption, Ekf& ekf);
 
   ImuCalibration imu_;
   double normal_walk_ = 0.0;  ///< [rad/sqrt(m)]; 0 without wheels

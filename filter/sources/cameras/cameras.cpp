@@ -73,14 +73,19 @@ const std::vector<StereoMatch>& Cameras::matches_with(const FeatureFrame& frame,
 }
 
 /// The features that show the motion count again when their tracks end: here they count a sixteenth, and still bring
-/// the state to where it is linear.
+/// the state to where it is linear. Images that are too unlike to show it have few in common, by which a state that is
+/// far off would learn to be elsewhere.
 bool Cameras::bridge(const FeatureFrame& frame, Ekf& ekf) {
   const State& x = ekf.state();
   const std::optional<Pose> before = image_pose(x);
   if (!before || count_ < 2 || x.clones.empty()) return false;
   const std::optional<StereoMotion> motion =
       stereo_motion(matches_with(frame, x.camera), x.camera, motion_since(*before, x.imu), frame_check_.sigma());
-  if (!motion) return false;
+  if (!motion) {
+    while (!x.clones.empty()) ekf.marginalise(0);
+    tracks_.clear();
+    return false;
+  }
   const Eigen::Matrix3d R_WB0 = x.clones.back().T_WB.R;
   Eigen::Matrix<double, 6, 6> to_world = Eigen::Matrix<double, 6, 6>::Zero();  // the fit's turn is in the later body
   to_world.topLeftCorner<3, 3>() = R_WB0 * motion->T_B0B1.R;
@@ -96,11 +101,6 @@ bool Cameras::bridge(const FeatureFrame& frame, Ekf& ekf) {
   llt.matrixL().solveInPlace(r);
   ekf.apply(H, 0, r, CameraUpdate::considered);
   return true;
-}
-
-void Cameras::forget(Ekf& ekf) {
-  while (!ekf.state().clones.empty()) ekf.marginalise(0);
-  tracks_.clear();
 }
 
 FrameAgreement Cameras::compare(const FeatureFrame& frame, const Ekf& ekf) {
