@@ -1,9 +1,11 @@
 // Jumps and gaps of the inertial sensors, the images and the clocks, for five seconds, on feature tracks.
 #include <doctest/doctest.h>
 
+#include <Eigen/Cholesky>
 #include <cstdint>
 #include <string>
 
+#include "tests/support/simulated_run.h"
 #include "tools/experiments/figures.h"
 #include "tools/simulator/faults.h"
 
@@ -106,6 +108,42 @@ TEST_CASE("jumps: what nearly two seconds without inertial samples leave unknown
       CHECK(outcome.ate < 0.2);
     }
   }
+}
+
+TEST_CASE("jumps: images with few features in common around a gap show nothing of the place") {
+  double nees = 0.0;
+  int runs = 0;
+  for (const char* const sequence : {"wave1", "fly1", "fly2"}) {
+    for (const std::uint64_t seed : {987, 988, 989, 990}) {
+      simulator::Options options;
+      options.sequence = sequence;
+      options.seed = seed;
+      options.duration = 24.0;
+      options.faults = {simulator::parse_fault("imu_gap@20+0.7")};
+      const simulator::Simulation simulation(options);
+      const TimeNs first_ns = simulation.frame_times().front();
+      Filter filter(FilterConfig{}, simulation.calibration());
+      const auto run = ear::test::run_filter(filter, simulation, [&](FeatureFrame& frame) {
+        if (seconds_between(first_ns, frame.t_ns) < 20.3) return;
+        int kept = 0;  // all others are taken for new ones
+        for (FeatureObservation& o : frame.features) {
+          if (o.id % 16 != 0 || ++kept > 8) o.id += 1'000'000;
+        }
+      });
+      REQUIRE(!run.empty());
+      const ear::test::EvaluatedEstimate& last = run.back();
+      const Eigen::Matrix3d P =
+          last.estimate.covariance.block<3, 3>(estimate_error::position, estimate_error::position);
+      CAPTURE(sequence);
+      CAPTURE(seed);
+      const double squares = last.dp_W.dot(P.ldlt().solve(last.dp_W));
+      MESSAGE(sequence, " ", seed, ": off by ", last.dp_W.norm(), ", NEES ", squares);
+      nees += squares;
+      ++runs;
+    }
+  }
+  MESSAGE("NEES ", nees / runs);
+  CHECK(nees / runs < 6.0);
 }
 
 TEST_CASE("jumps: clipped jolts, four a second, with and without wheels on the ground") {

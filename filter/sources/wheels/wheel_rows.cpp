@@ -1,5 +1,7 @@
 #include "filter/sources/wheels/wheel_rows.h"
 
+#include <algorithm>
+
 namespace ear {
 
 void WheelRows::measure_at(double lever) {
@@ -87,7 +89,7 @@ double speed_left_out(const Eigen::Matrix3d& R_WO, const Eigen::Matrix3d& phi, c
   const Eigen::Matrix3d forward = forward_by_phi * phi * forward_by_phi.transpose();
   const Eigen::Matrix3d forward_nu = forward_by_phi * phi_nu;
   const double mean = forward_nu.trace();
-  return (forward * nu).trace() + (forward_nu * forward_nu).trace() + mean * mean;
+  return std::max(0.0, (forward * nu).trace() + (forward_nu * forward_nu).trace() + mean * mean);
 }
 
 }  // namespace ear
