@@ -12,7 +12,7 @@ namespace ear::calibration {
 namespace {
 
 constexpr double kGate = 6.0;  // [sigma] of wheels and beams, once there is a solution
-constexpr int kFirst = 12;     // iterations
+constexpr int kFirst = 16;     // iterations
 constexpr int kNext = 6;
 constexpr int kWhole = 3;         // rounds
 constexpr double kLasting = 1.1;  // of the features' errors, from which on they are weighed anew
