@@ -137,13 +137,13 @@ TEST_CASE("jumps: images with few features in common around a gap show nothing o
       CAPTURE(sequence);
       CAPTURE(seed);
       const double squares = last.dp_W.dot(P.ldlt().solve(last.dp_W));
-      MESSAGE(sequence, " ", seed, ": off by ", last.dp_W.norm(), ", NEES ", squares);
+      MESSAGE(std::string(sequence), " ", seed, ": off by ", last.dp_W.norm(), ", NEES ", squares);
       nees += squares;
       ++runs;
     }
   }
   MESSAGE("NEES ", nees / runs);
-  CHECK(nees / runs < 6.0);
+  CHECK(nees / runs < 4.5);  // 5.2 where they count
 }
 
 TEST_CASE("jumps: clipped jolts, four a second, with and without wheels on the ground") {

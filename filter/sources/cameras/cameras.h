@@ -45,8 +45,8 @@ class Cameras {
 
   /// Where the inertial samples since the last image may be wrong by more than noise (clipped, missing, stamps that
   /// jumped), the two images show how the body moved, roughly: later, the features of both will show it in full, around
-  /// a state that is near enough to be linear. False if they did not: where two cameras could have, clones and tracks of
-  /// before are gone then.
+  /// a state that is near enough to be linear. False if they did not: where two cameras could have, clones and tracks
+  /// of before are gone then.
   bool bridge(const FeatureFrame& frame, Ekf& ekf);
   /// At the state's time, which is the frame's, before the frame changes it: does it show the motion since the last
   /// image that the other sensors predict?
