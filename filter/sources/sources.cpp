@@ -121,7 +121,6 @@ FrameAgreement Sources::check(const FeatureFrame& frame, Ingest& ingest, Ekf& ek
       camera_update_ = CameraUpdate::considered;
       ingest.interruption().set_bridged(ekf.state().imu.t_ns);
     }
-    clone_is_here_ = clone_is_here_ && !ekf.state().clones.empty();
     seen = cameras_.compare(frame, ekf);
   }
   seen.right_skipped = frame.right_skipped;
@@ -130,7 +129,7 @@ FrameAgreement Sources::check(const FeatureFrame& frame, Ingest& ingest, Ekf& ek
 
 /// A vehicle that moves on without an image leaves no clone.
 void Sources::update(const FeatureFrame* image, bool stands, const Advice& advice, Ekf& ekf, Records& records) {
-  const bool holds = stands && clone_is_here_;
+  const bool holds = stands && clone_is_here_ && !ekf.state().clones.empty();  // which a bridge may have dropped
   clone_is_here_ = image != nullptr || stands;
   if (holds) {
     hold(ekf, records);

@@ -41,12 +41,9 @@ WheelRows rows_of(const State& x, const WheelIncrement& turn, const Eigen::Vecto
 
 /// As it is where side and slope fit: along the path.
 State along_path(State x, const Eigen::Vector3d& gyro_B, OdometerModel model, bool normal_known) {
-  const OdometerState& odometer = x.odometer;
-  const bool on_plane = model == OdometerModel::terrain && normal_known;
-  const Eigen::Vector3d n =
-      on_plane ? Eigen::Vector3d(x.imu.R_WB.transpose() * x.ground.n_W) : Eigen::Vector3d(odometer.T_BO.R.col(2));
-  const Eigen::Vector3d path = odometer.T_BO.R.col(1).cross(n).normalized();
-  x.imu.v_W = x.imu.R_WB * (0.7 * path - x.imu.rate_B(gyro_B).cross(odometer.T_BO.p));
+  const WheelRows rows = rows_of(x, rims(0.0, 0.0), gyro_B, model, normal_known);
+  const Eigen::Vector3d path = rows.direction.row(WheelRows::speed).transpose();
+  x.imu.v_W = x.imu.R_WB * (0.7 * path - x.imu.rate_B(gyro_B).cross(x.odometer.T_BO.p));
   return x;
 }
 

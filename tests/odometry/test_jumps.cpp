@@ -24,14 +24,19 @@ struct Outcome {
 constexpr double kFault = 20.0;  // [s]
 constexpr std::uint64_t kSeed = 831;
 
-Outcome run(const std::string& sequence, const std::string& fault, std::uint64_t seed = kSeed) {
+simulator::Simulation simulate(const std::string& sequence, const std::string& fault, std::uint64_t seed,
+                               double duration) {
   simulator::Options options;
   options.sequence = sequence;
   options.seed = seed;
-  options.duration = 35.0;
+  options.duration = duration;
   const bool placed = fault.find('@') != std::string::npos;
   if (!fault.empty()) options.faults = {simulator::parse_fault(placed ? fault : fault + "@20+5")};
-  const simulator::Simulation simulation(options);
+  return simulator::Simulation(options);
+}
+
+Outcome run(const std::string& sequence, const std::string& fault, std::uint64_t seed = kSeed) {
+  const simulator::Simulation simulation = simulate(sequence, fault, seed, 35.0);
   Outcome outcome;
   TimeNs last_ns = 0;
   const Figures figures = measure(simulation, simulation.calibration(), FilterConfig{}, evaluation::AlignmentKind::yaw,
@@ -115,12 +120,7 @@ TEST_CASE("jumps: images with few features in common around a gap show nothing o
   int runs = 0;
   for (const char* const sequence : {"wave1", "fly1", "fly2"}) {
     for (const std::uint64_t seed : {987, 988, 989, 990}) {
-      simulator::Options options;
-      options.sequence = sequence;
-      options.seed = seed;
-      options.duration = 24.0;
-      options.faults = {simulator::parse_fault("imu_gap@20+0.7")};
-      const simulator::Simulation simulation(options);
+      const simulator::Simulation simulation = simulate(sequence, "imu_gap@20+0.7", seed, 24.0);
       const TimeNs first_ns = simulation.frame_times().front();
       Filter filter(FilterConfig{}, simulation.calibration());
       const auto run = ear::test::run_filter(filter, simulation, [&](FeatureFrame& frame) {

@@ -48,8 +48,9 @@ struct WheelRows {
                                          const WheelIncrement& turn, const Eigen::Vector3d& gyro_B, OdometerModel model,
                                          bool normal_known);
 
-/// What they leave out of the speed where the wheels' forward is the odometer's: the error of that direction times that
-/// of the velocity. Its mean square [m^2/s^2], of the covariances of phi, of phi with nu, and of nu.
+/// What the row of the speed leaves out as it is linear, where the wheels' forward is the odometer's: the error of that
+/// direction times that of the velocity. Its mean square [m^2/s^2], by the covariances of phi, of phi with nu, and of
+/// nu.
 [[nodiscard]] double speed_left_out(const Eigen::Matrix3d& R_WO, const Eigen::Matrix3d& phi,
                                     const Eigen::Matrix3d& phi_nu, const Eigen::Matrix3d& nu);
 

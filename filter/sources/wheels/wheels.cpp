@@ -14,6 +14,11 @@ namespace {
 
 constexpr double kSlipLasts = 0.1;  // [s] measured, docs/decisions/0039: a slip is the same for so long
 
+/// How many readings like this one share an error that lasts so long [s].
+double readings_that_share(double lasting, const WheelIncrement& increment) {
+  return std::max(1.0, lasting / increment.duration());
+}
+
 }  // namespace
 
 Wheels::Wheels(const OdometerConfig& config, const Calibration& calibration, bool sees_ground)
@@ -141,7 +146,7 @@ void Wheels::show_time_offset(WheelRows& rows, const WheelIncrement& stamped, co
       running_.speed_change.add(rows.predicted_rim_speed(), sigma, stamped);
 }
 
-/// It is no white noise: readings of a moment share it.
+/// No white noise: what the first order leaves out is the same for readings of a moment.
 void Wheels::add_left_out(Sigmas& sigma, const Eigen::Matrix3d& R_WB, const WheelIncrement& increment,
                           const Ekf& ekf) const {
   if (sees_ground_) return;
@@ -149,7 +154,7 @@ void Wheels::add_left_out(Sigmas& sigma, const Eigen::Matrix3d& R_WB, const Whee
   const double variance =
       speed_left_out(R_WB * ekf.state().odometer.T_BO.R, P.block<3, 3>(err::odometer, err::odometer),
                      P.block<3, 3>(err::odometer, err::nu), P.block<3, 3>(err::nu, err::nu));
-  const double readings = std::max(1.0, kStreamGap / increment.duration());
+  const double readings = readings_that_share(kStreamGap, increment);
   sigma(WheelRows::speed) = std::hypot(sigma(WheelRows::speed), std::sqrt(readings * variance));
 }
 
@@ -167,7 +172,7 @@ void Wheels::score_wheels(WheelRows& rows, Sigmas& sigma, const WheelIncrement& 
                           const Ekf& ekf, Records& records) {
   const double half = 0.5 * ekf.state().odometer.track_width;
   const double noise = std::hypot(sigma(WheelRows::speed), half * sigma(WheelRows::yaw_rate));
-  const double readings = std::max(1.0, kSlipLasts / increment.duration());
+  const double readings = readings_that_share(kSlipLasts, increment);
   std::array<double, 2> information{};
   for (std::size_t i = 0; i < 2; ++i) {
     const double side = i == 0 ? -half : half;
