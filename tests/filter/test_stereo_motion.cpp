@@ -122,6 +122,27 @@ TEST_CASE("stereo motion: with noise the error is about what the covariance says
   CHECK(sum < 7.0);  // 3, and what the depths share that the sums take as independent
 }
 
+TEST_CASE("stereo motion: from a start that is metres off it is the same as from the truth") {
+  const Eigen::Vector3d turn(-0.05, 0.08, 0.1), way(1.2, 0.1, -0.05);
+  for (unsigned seed = 1; seed <= 60; ++seed) {
+    CAPTURE(seed);
+    std::mt19937_64 rng{seed};
+    std::normal_distribution<double> normal;
+    const auto off = [&](double size) {
+      const double a = normal(rng), b = normal(rng), c = normal(rng);
+      return Eigen::Vector3d(size * Eigen::Vector3d(a, b, c).normalized());
+    };
+    const Pose start{exp_so3(turn) * exp_so3(off(0.6)), way + off(2.5)};
+    const std::vector<StereoMatch> matches = matched(look(exp_so3(turn), way, kSigma, seed));
+    const auto motion = stereo_motion(matches, cameras(), start, kSigma);
+    const auto from_truth = stereo_motion(matches, cameras(), {exp_so3(turn), way}, kSigma);
+    REQUIRE(from_truth);
+    REQUIRE(motion);
+    CHECK((motion->T_B0B1.p - from_truth->T_B0B1.p).norm() < 1e-3);
+    CHECK(log_so3(motion->T_B0B1.R.transpose() * from_truth->T_B0B1.R).norm() < 1e-3);
+  }
+}
+
 TEST_CASE("stereo motion: a third of the features on something that moves does not lead it astray") {
   Pair pair = look(exp_so3(kTurn), kWay, kSigma, 3);
   for (std::size_t i = 0; i < 30; ++i) {

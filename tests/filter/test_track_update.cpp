@@ -3,8 +3,12 @@
 
 #include <doctest/doctest.h>
 
+#include <Eigen/Cholesky>
 #include <cmath>
+#include <random>
+#include <vector>
 
+#include "filter/ekf/so3.h"
 #include "tests/support/about.h"
 
 using namespace ear;
@@ -77,13 +81,110 @@ struct Passage {
     }
     tracks.add(x.clones.back().frame, features);
   }
-  void run() { update.update(false, CameraUpdate::considered, tracks, ekf, records); }
+  void run() { update.update(UsedTracks::ended, CameraUpdate::considered, tracks, ekf, records); }
   [[nodiscard]] double velocity_sigma(int axis) const {
     return std::sqrt(ekf.covariance().matrix()(err::nu + axis, err::nu + axis));
   }
 };
 
+/// Two images of both cameras, and between them a motion of which the state knows little.
+struct Gap {
+  static constexpr double kSigma = 0.6 / kFocal;
+
+  FilterConfig config;
+  Ekf ekf{config, Passage::rig(2)};
+  TrackTable tracks{64, 16};
+  TrackUpdate update{config, kFocal};
+  Records records;
+  Pose T_WB1;  ///< the true pose at the second image
+  std::vector<Eigen::Vector3d> points_W;
+  std::mt19937_64 random;
+  std::normal_distribution<double> normal;
+
+  /// Points that are `near` to `far` [m] away; `turn` [rad] and `shift` [m]: standard deviations, each axis.
+  Gap(std::uint64_t seed, double near, double far, double turn, double shift) : random(seed) {
+    std::uniform_real_distribution<double> uniform(-1.0, 1.0);
+    for (int i = 0; i < 20; ++i) {
+      const double depth = 0.5 * (near + far) + 0.5 * (far - near) * uniform(random);
+      points_W.emplace_back(0.4 * depth * uniform(random), 0.3 * depth * uniform(random), depth);
+    }
+    ImuState x;
+    x.t_ns = kStart;
+    ekf.start(x, Eigen::VectorXd::Constant(err::clones, 1e-6));
+    ekf.clone(1.0);
+    see(Pose{});
+    T_WB1 = {exp_so3(turn * draw()), shift * draw()};
+    ekf.inflate_motion(turn, 1.0, shift);
+    ekf.clone(1.0);
+    see(T_WB1);
+  }
+  Eigen::Vector3d draw() {
+    const double a = normal(random), b = normal(random), c = normal(random);
+    return {a, b, c};
+  }
+  void see(const Pose& T_WB) {
+    const Eigen::Vector3d p_C0C1 = ekf.state().camera.T_C0C1.p;
+    std::vector<FeatureObservation> features;
+    for (std::size_t id = 0; id < points_W.size(); ++id) {
+      const Eigen::Vector3d f_C = T_WB.R.transpose() * (points_W[id] - T_WB.p);
+      const Eigen::Vector3d noise = draw();
+      FeatureObservation seen;
+      seen.id = id;
+      seen.left = f_C.hnormalized() + kSigma * noise.head<2>();
+      seen.has_right = true;
+      seen.right = (f_C - p_C0C1).hnormalized() + kSigma * Eigen::Vector2d(noise.z(), normal(random));
+      features.push_back(seen);
+    }
+    tracks.add(ekf.state().clones.back().frame, features);
+  }
+  /// Of the pose at the second image; 6 where the covariance is right.
+  [[nodiscard]] double nees() const {
+    const Pose& found = ekf.state().clones.back().T_WB;
+    Eigen::Matrix<double, 6, 1> e;  // the clone's error
+    e.head<3>() = log_so3(T_WB1.R * found.R.transpose());
+    e.tail<3>() = T_WB1.p - exp_so3(e.head<3>()) * found.p;
+    const Eigen::Matrix<double, 6, 6> P = ekf.covariance().matrix().block<6, 6>(err::clone(1), err::clone(1));
+    return e.dot(P.ldlt().solve(e));
+  }
+};
+
 }  // namespace
+
+TEST_CASE("track update: after a gap all tracks count together, where they show the motion to have been") {
+  double sum = 0.0, first_step = 0.0;
+  constexpr int kDraws = 60;
+  for (int seed = 0; seed < kDraws; ++seed) {
+    Gap gap(static_cast<std::uint64_t>(seed), 3.0, 7.0, 0.15, 0.3);
+    gap.update.update(UsedTracks::ended, CameraUpdate::considered, gap.tracks, gap.ekf, gap.records);
+    CHECK(gap.records.statistics.features_used == 0);  // they go on
+    gap.update.update(UsedTracks::all, CameraUpdate::considered, gap.tracks, gap.ekf, gap.records);
+    CHECK(gap.records.statistics.features_used >= 18);
+    CHECK(gap.tracks.size() == 0);
+    sum += gap.nees();
+
+    Gap again(static_cast<std::uint64_t>(seed), 3.0, 7.0, 0.15, 0.3);  // the same by the first order alone
+    again.update.update(UsedTracks::oldest_too, CameraUpdate::considered, again.tracks, again.ekf, again.records);
+    first_step += again.nees();
+  }
+  MESSAGE("NEES ", sum / kDraws, ", by the first order alone ", first_step / kDraws);
+  CHECK(sum / kDraws < 9.0);
+  CHECK(sum / kDraws > 4.0);
+  CHECK(first_step > 3.0 * sum);
+}
+
+TEST_CASE("track update: after a gap what is not known of the depths of far features is noise") {
+  double sum = 0.0;
+  constexpr int kDraws = 60;
+  for (int seed = 0; seed < kDraws; ++seed) {
+    Gap gap(static_cast<std::uint64_t>(seed), 12.0, 25.0, 0.05, 1.0);
+    gap.update.update(UsedTracks::all, CameraUpdate::considered, gap.tracks, gap.ekf, gap.records);
+    CHECK(gap.records.statistics.features_used >= 18);
+    sum += gap.nees();
+  }
+  MESSAGE("NEES ", sum / kDraws);
+  CHECK(sum / kDraws > 2.0);  // 40 without
+  CHECK(sum / kDraws < 9.0);
+}
 
 TEST_CASE("track update: features of one camera show the less, the less it is known how far it moved") {
   double before = 0.0;

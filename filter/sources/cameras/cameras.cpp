@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "filter/ekf/initial_state.h"
 #include "filter/ekf/relative_motion.h"
@@ -12,6 +13,14 @@ namespace {
 
 constexpr double kBridgePosition = 5e-3;  // [m] chosen, as kSeenTurn: well above what the features will show later
 constexpr double kComparedStep = 1e-4;    // [rad, m] chosen: a tenth of what two images show
+
+/// Of the turn since the newest clone, all axes together [rad^2].
+double turn_variance_since_clone(const Ekf& ekf) {
+  const auto P = ekf.covariance().matrix();
+  const int clone = err::clone(static_cast<int>(ekf.state().clones.size()) - 1);
+  return P.diagonal().segment<3>(err::theta).sum() + P.diagonal().segment<3>(clone).sum() -
+         2.0 * P.block<3, 3>(err::theta, clone).trace();
+}
 
 /// The body now, in the body as it was.
 Pose motion_since(const Pose& T_WB0, const ImuState& now) {
@@ -28,7 +37,8 @@ Cameras::Cameras(const FilterConfig& config, const Calibration& calibration)
       track_update_(config, focal_px_),
       window_(config, focal_px_),
       frame_check_(config.feature_sigma_px, focal_px_),
-      rows_(6, err::clone(config.window + 1)) {
+      rows_(6, err::clone(config.window + 1)),
+      iterated_(config.window) {
   last_features_.features.reserve(kFeatureCapacity);
   compared_.before.features.reserve(kFeatureCapacity);
 }
@@ -72,35 +82,53 @@ const std::vector<StereoMatch>& Cameras::matches_with(const FeatureFrame& frame,
   return matches_.find(last_features_, frame, cameras);
 }
 
-/// The features that show the motion count again when their tracks end: here they count a sixteenth, and still bring
-/// the state to where it is linear. Images that are too unlike to show it have few in common, by which a state that is
-/// far off would learn to be elsewhere.
+/// Images that are too unlike to show it have few features in common, by which a state that is far off would learn to
+/// be elsewhere.
 bool Cameras::bridge(const FeatureFrame& frame, Ekf& ekf) {
   const State& x = ekf.state();
   const std::optional<Pose> before = image_pose(x);
   if (!before || count_ < 2 || x.clones.empty()) return false;
   const std::optional<StereoMotion> motion =
       stereo_motion(matches_with(frame, x.camera), x.camera, motion_since(*before, x.imu), frame_check_.sigma());
-  if (!motion) {
+  if (motion) {
+    apply_bridge(*motion, ekf);
+  } else {
     while (!x.clones.empty()) ekf.marginalise(0);
     tracks_.clear();
-    return false;
   }
+  return motion.has_value();
+}
+
+/// The features that show the motion count again: here they count a sixteenth, and still bring the state to where it is
+/// linear. Where the turn is not known well then, its square moves them by more than noise, and they count at once.
+void Cameras::apply_bridge(const StereoMotion& motion, Ekf& ekf) {
+  const State& x = ekf.state();
   const Eigen::Matrix3d R_WB0 = x.clones.back().T_WB.R;
   Eigen::Matrix<double, 6, 6> to_world = Eigen::Matrix<double, 6, 6>::Zero();  // the fit's turn is in the later body
-  to_world.topLeftCorner<3, 3>() = R_WB0 * motion->T_B0B1.R;
+  to_world.topLeftCorner<3, 3>() = R_WB0 * motion.T_B0B1.R;
   to_world.bottomRightCorner<3, 3>() = R_WB0;
-  Eigen::Matrix<double, 6, 6> covariance = kClear * kClear * to_world * motion->covariance * to_world.transpose();
+  Eigen::Matrix<double, 6, 6> covariance = kClear * kClear * to_world * motion.covariance * to_world.transpose();
   covariance.diagonal().head<3>().array() += kSeenTurn * kSeenTurn;
   covariance.diagonal().tail<3>().array() += kBridgePosition * kBridgePosition;
   const Eigen::LLT<Eigen::Matrix<double, 6, 6>> llt(covariance);
   auto H = rows_.topLeftCorner(6, x.error_size());
   Eigen::Matrix<double, 6, 1> r;
-  linearize_relative_motion(x, motion->T_B0B1, H, r);
-  llt.matrixL().solveInPlace(H);
-  llt.matrixL().solveInPlace(r);
+  const auto linearize = [&](const State& at) {
+    linearize_relative_motion(at, motion.T_B0B1, H, r);
+    llt.matrixL().solveInPlace(H);
+    llt.matrixL().solveInPlace(r);
+  };
+  linearize(x);
+  iterated_.run(
+      x, [&] { return ekf.correction(H, 0, r, CameraUpdate::considered); },
+      [&](const State& found, const auto& moved) {
+        linearize(found);
+        r.noalias() += H.lazyProduct(moved);
+        return true;
+      });
   ekf.apply(H, 0, r, CameraUpdate::considered);
-  return true;
+  const double left_out = 0.5 * turn_variance_since_clone(ekf);
+  gap_is_wide_ = left_out > frame_check_.sigma();
 }
 
 FrameAgreement Cameras::compare(const FeatureFrame& frame, const Ekf& ekf) {
@@ -125,7 +153,9 @@ void Cameras::update(const FeatureFrame& frame, double weight, CameraUpdate cali
   ekf.clone(frame_check_.noise() / weight);
   tracks_.add(ekf.state().clones.back().frame, frame.features);
   const std::optional<std::size_t> next = window_.to_marginalise(ekf.state(), tracks_);
-  track_update_.update(next && *next == 0, calibration, tracks_, ekf, records);
+  const UsedTracks ordinary = next && *next == 0 ? UsedTracks::oldest_too : UsedTracks::ended;
+  const UsedTracks use = std::exchange(gap_is_wide_, false) ? UsedTracks::all : ordinary;
+  track_update_.update(use, calibration, tracks_, ekf, records);
   window_.add_updates(records.statistics.features_used, ekf.state().imu.t_ns);
   marginalise(next, ekf);
   while (ekf.state().clones.size() > window_.size()) marginalise(0, ekf);  // the window has become smaller
@@ -166,6 +196,7 @@ void Cameras::reset() {
   track_update_.reset();
   window_.reset();
   compared_.t_ns = 0;
+  gap_is_wide_ = false;
   if (!last_) return;
   last_->T_WB.reset();
   last_->clone.reset();

@@ -9,6 +9,7 @@
 #include "filter/ekf/displacement.h"
 #include "filter/ekf/ekf.h"
 #include "filter/ekf/imu_displacement.h"
+#include "filter/ekf/iterated_update.h"
 #include "filter/ekf/records.h"
 #include "filter/sources/cameras/frame_check.h"
 #include "filter/sources/cameras/stereo_motion.h"
@@ -86,6 +87,7 @@ class Cameras {
 
   /// Of the last image that was used with the frame at hand.
   const std::vector<StereoMatch>& matches_with(const FeatureFrame& frame, const CameraState& cameras);
+  void apply_bridge(const StereoMotion& motion, Ekf& ekf);
   void marginalise(std::optional<std::size_t> clone, Ekf& ekf);
 
   FilterConfig config_;
@@ -99,7 +101,10 @@ class Cameras {
   Compared compared_;
   std::optional<LastImage> last_;
   FeatureFrame last_features_;
-  Eigen::MatrixXd rows_;  // memory that is used again
+  bool gap_is_wide_ = false;  ///< the motion since the newest clone is known too little for the first order
+  // Memory that is used again.
+  Eigen::MatrixXd rows_;
+  IteratedUpdate iterated_;
 };
 
 }  // namespace ear

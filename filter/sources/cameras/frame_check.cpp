@@ -12,11 +12,6 @@ namespace {
 
 constexpr double kSigmasPerMedian = 1.4826;  // standard deviation over median absolute deviation of a normal variable
 
-/// Standard deviation of an inverse depth by stereo [1/m]. `sigma`: of one observation, normalized.
-double inverse_depth_sigma(double sigma, const CameraState& cameras) {
-  return std::sqrt(2.0) * sigma / cameras.T_C0C1.p.norm();
-}
-
 double share(int part, int of) { return of > 0 ? static_cast<double>(part) / of : 0.0; }
 
 }  // namespace
@@ -46,7 +41,7 @@ void FrameCheck::measure_noise(const FeatureFrame& frame, const CameraState& cam
 }
 
 double FrameCheck::share_behind(const FeatureFrame& frame, const CameraState& cameras) const {
-  const double sigma_s = inverse_depth_sigma(sigma(), cameras);
+  const double sigma_s = stereo_inverse_depth_sigma(cameras, sigma());
   int seen = 0, behind = 0;
   for (const FeatureObservation& feature : frame.features) {
     if (!feature.has_right) continue;
@@ -65,7 +60,7 @@ FrameAgreement FrameCheck::compare(const std::vector<StereoMatch>& matches, cons
   const Pose& T_BC0 = cameras.T_BC0;
   const Pose T_BC1 = T_BC0 * cameras.T_C0C1;
   const double noise = 2.0 * sigma() * sigma();
-  const double sigma_s = inverse_depth_sigma(sigma(), cameras);
+  const double sigma_s = stereo_inverse_depth_sigma(cameras, sigma());
   const double distance = T_B0B1.p.norm();
   int off_left = 0, off_right = 0, seen_right = 0;
   for (const StereoMatch& match : matches) {

@@ -15,7 +15,7 @@
 namespace ear {
 namespace {
 
-constexpr int kIterations = 12;  // chosen
+constexpr int kIterations = 50;  // chosen: from where samples that are missing leave the motion, some 20
 
 /// Sums of one Gauss-Newton step over (rotation, translation).
 struct NormalEquations {
@@ -160,6 +160,10 @@ double stereo_inverse_depth(const CameraState& cameras, const Eigen::Vector2d& l
   return inverse_depth(T_C1C0.R * left.homogeneous(), T_C1C0.p, right);
 }
 
+double stereo_inverse_depth_sigma(const CameraState& cameras, double sigma) {
+  return std::sqrt(2.0) * sigma / cameras.T_C0C1.p.norm();
+}
+
 std::optional<StereoMotion> stereo_motion(const std::vector<StereoMatch>& matches, const CameraState& cameras,
                                           const Pose& start, double sigma, double settled, Kernels kernels) {
   StereoMotion motion;
@@ -167,6 +171,7 @@ std::optional<StereoMotion> stereo_motion(const std::vector<StereoMatch>& matche
   motion.matches = static_cast<int>(matches.size());
   if (motion.matches < kFewFeatures) return std::nullopt;
   Problem problem(matches, cameras, sigma, kernels);
+  bool has_settled = false;
   for (int iteration = 0; iteration < kIterations; ++iteration) {
     const NormalEquations sums = problem.step(motion.T_B0B1, motion.fitting);
     const Eigen::LDLT<Eigen::Matrix<double, 6, 6>> ldlt(sums.A);
@@ -175,8 +180,11 @@ std::optional<StereoMotion> stereo_motion(const std::vector<StereoMatch>& matche
     motion.T_B0B1.R = motion.T_B0B1.R * exp_so3(step.head<3>());
     motion.T_B0B1.p += step.tail<3>();
     motion.covariance = ldlt.solve(Eigen::Matrix<double, 6, 6>::Identity());
-    if (step.norm() < settled) break;
+    const bool ends = step.norm() < settled;
+    has_settled = ends || step.dot(sums.b) < kPrecise * kPrecise;  // in variances
+    if (ends) break;
   }
+  if (!has_settled) return std::nullopt;
   const bool together = motion.fitting >= kFewFeatures && motion.fitting >= kMajority * motion.matches;
   if (!together || !(motion.covariance.diagonal().minCoeff() > 0.0)) return std::nullopt;
   return motion;

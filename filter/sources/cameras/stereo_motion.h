@@ -39,6 +39,8 @@ class StereoMatches {
 /// images contradict the cameras' geometry.
 [[nodiscard]] double stereo_inverse_depth(const CameraState& cameras, const Eigen::Vector2d& left,
                                           const Eigen::Vector2d& right);
+/// Its standard deviation [1/m]. `sigma`: of one observation, normalized.
+[[nodiscard]] double stereo_inverse_depth_sigma(const CameraState& cameras, double sigma);
 
 /// [standard deviations] chosen: from where an observation weighs less.
 inline constexpr double kHuber = 2.0;

@@ -6,12 +6,12 @@
 #include <utility>
 
 #include "filter/ingest/limits.h"
+#include "filter/sources/cameras/stereo_motion.h"
 
 namespace ear {
 namespace {
 
 constexpr double kNotAveraged = 2.0;  // measured, docs/decisions/0053: what is left out is alike in many features
-constexpr int kIterations = 2;        // measured, docs/decisions/0059: one gives 3/4 of the gain, three no more
 constexpr double kNegligible = 1e-4;  // measured, docs/performance.md: 2e-4 of a frame's information, 12 % of the rows
 
 int clone_index(const State& x, std::uint64_t frame) {
@@ -48,22 +48,26 @@ bool refuse_few(Records& records) {
 }  // namespace
 
 TrackUpdate::TrackUpdate(const FilterConfig& config, double focal_px)
-    : config_(config), focal_px_(focal_px), information_(config.window + 1, config.max_track_updates, config.kernels) {
+    : config_(config),
+      focal_px_(focal_px),
+      information_(config.window + 1, config.max_track_updates, config.kernels),
+      iterated_(config.window) {
   const auto clones = static_cast<std::size_t>(config.window) + 1;
   cameras_.reserve(2 * clones);
   sightings_.reserve(2 * clones);
   observations_.reserve(2 * clones);
   selected_.reserve(2 * kFeatureCapacity);
   used_.reserve(2 * kFeatureCapacity);
-  found_.clones.reserve(clones);
-  moved_.setZero(err::clone(config.window + 1));
 }
 
-void TrackUpdate::update(bool oldest_goes, CameraUpdate calibration, TrackTable& tracks, Ekf& ekf, Records& records) {
+/// After a gap the tracks that span it are used at once: one after the other, each would move a state that is far off
+/// by what it does not know of the others.
+void TrackUpdate::update(UsedTracks use, CameraUpdate calibration, TrackTable& tracks, Ekf& ekf, Records& records) {
   const State& x = ekf.state();
-  select(x, oldest_goes, tracks);
+  use_ = use;
+  select(x, use, tracks);
   linearize(tracks, x, false, ekf);
-  if (most_left_out_ > 1.0) iterate(tracks, calibration, ekf);  // more than an image's noise
+  if (use == UsedTracks::all || most_left_out_ > 1.0) iterate(tracks, calibration, ekf);  // more than an image's noise
   for (std::size_t k = 0; k < selected_.size(); ++k) {
     const std::size_t i = selected_[k];
     const bool used = used_[k];
@@ -83,20 +87,24 @@ void TrackUpdate::update(bool oldest_goes, CameraUpdate calibration, TrackTable&
 }
 
 /// The longest first.
-void TrackUpdate::select(const State& x, bool oldest_goes, const TrackTable& tracks) {
+void TrackUpdate::select(const State& x, UsedTracks use, const TrackTable& tracks) {
   selected_.clear();
+  const bool all = use == UsedTracks::all;
   for (std::size_t i = 0; i < tracks.size(); ++i) {
     const Track& track = tracks[i];
     if (track.observations.size() < kMinObservations) continue;
-    const bool fills_window = oldest_goes && track.observations.front().frame == x.clones.front().frame;
-    if (!continues(track, x) || fills_window) selected_.push_back(i);
+    const bool fills_window =
+        use == UsedTracks::oldest_too && track.observations.front().frame == x.clones.front().frame;
+    if (all || fills_window || !continues(track, x)) selected_.push_back(i);
   }
-  const auto longer = [&](std::size_t a, std::size_t b) {
+  const auto sooner = [&](std::size_t a, std::size_t b) {
+    const bool goes_on_a = all && continues(tracks[a], x), goes_on_b = all && continues(tracks[b], x);
+    if (goes_on_a != goes_on_b) return goes_on_a;
     const std::size_t observations_a = tracks[a].observations.size();
     const std::size_t observations_b = tracks[b].observations.size();
     return observations_a != observations_b ? observations_a > observations_b : a < b;
   };
-  std::sort(selected_.begin(), selected_.end(), longer);
+  std::sort(selected_.begin(), selected_.end(), sooner);
   const auto limit = static_cast<std::size_t>(config_.max_track_updates);
   if (selected_.size() > limit) selected_.resize(limit);
 }
@@ -111,17 +119,16 @@ void TrackUpdate::linearize(const TrackTable& tracks, const State& at, bool agai
   information_.compress(kNegligible);
 }
 
-/// The update is where the sum of squares, of the prior too, is least: found by Gauss-Newton, whose first step is the
-/// ordinary update (Bell and Cathey 1993). The rows are those of where the step before ended.
 void TrackUpdate::iterate(const TrackTable& tracks, CameraUpdate calibration, Ekf& ekf) {
-  auto moved = moved_.head(ekf.state().error_size());
-  for (int i = 0; i < kIterations && information_.residual().size() > 0; ++i) {
-    moved = ekf.correction(information_.H(), err::camera, information_.residual(), calibration);
-    found_ = ekf.state();
-    boxplus(found_, moved);
-    linearize(tracks, found_, true, ekf);
-    information_.take_back(moved.tail(moved.size() - err::camera));
-  }
+  const auto any = [this] { return information_.residual().size() > 0; };
+  if (!any()) return;
+  iterated_.run(
+      ekf.state(), [&] { return ekf.correction(information_.H(), err::camera, information_.residual(), calibration); },
+      [&](const State& found, const auto& moved) {
+        linearize(tracks, found, true, ekf);
+        information_.take_back(moved.tail(moved.size() - err::camera));
+        return any();
+      });
 }
 
 bool TrackUpdate::add(const Track& track, const State& x, bool again, const Ekf& ekf) {
@@ -133,7 +140,7 @@ bool TrackUpdate::add(const Track& track, const State& x, bool again, const Ekf&
   const std::optional<InverseDepthPoint> point = triangulate(sightings_);
   if (!point) return false;
   const double sigma = config_.feature_sigma_px / focal_px_;
-  const double unseen = kNotAveraged * left_out(track, point->inverse_depth, again, ekf) / sigma;
+  const double unseen = left_out(track, point->inverse_depth, again, ekf) / sigma;
   most_left_out_ = std::max(most_left_out_, unseen);
   const double noise = std::hypot(1.0, unseen);
   observations_.clear();
@@ -147,27 +154,37 @@ bool TrackUpdate::add(const Track& track, const State& x, bool again, const Ekf&
                           ekf.gate());
 }
 
-/// One camera shows the product of how far it moved and how near the feature is, of which the filter takes the first
-/// order. What that leaves out is the square of the way's uncertainty over the way, of the parallax; two cameras are as
-/// far apart as they are. docs/decisions/0053.
+/// Where a feature is seen depends on the product of how near it is and how far the camera moved, of which the filter
+/// takes the first order. The product of what is unknown of both is left out. By one camera a feature is as near as the
+/// way says: docs/decisions/0053. By two it is as near as their noise says, each another one, and the way is known but
+/// for a gap: docs/decisions/0066.
 double TrackUpdate::left_out(const Track& track, double inverse_depth, bool again, const Ekf& ekf) const {
-  if (sightings_.size() > track.observations.size()) return 0.0;  // a right camera saw it, too
+  const State& x = ekf.state();
+  const std::size_t by_right = sightings_.size() - track.observations.size();
+  if (by_right > 0) {
+    if (use_ != UsedTracks::all) return 0.0;
+    const double sigma = config_.feature_sigma_px / focal_px_ / std::sqrt(static_cast<double>(by_right));
+    const int from = clone_index(x, track.observations.front().frame);
+    const int to = clone_index(x, track.observations.back().frame);
+    const double variance = way_covariance(from, to, again, ekf).trace();
+    return stereo_inverse_depth_sigma(x.camera, sigma) * std::sqrt(std::max(0.0, variance));
+  }
   const Eigen::Vector3d& p_from = sightings_.front().p_WC;
   const auto farthest =
       std::max_element(sightings_.begin(), sightings_.end(), [&](const Sighting& a, const Sighting& b) {
         return (a.p_WC - p_from).squaredNorm() < (b.p_WC - p_from).squaredNorm();
       });
   if (farthest == sightings_.begin()) return 0.0;
-  const Eigen::Vector3d& p_to = farthest->p_WC;
-  const double way = (p_to - p_from).norm();
-  const Eigen::RowVector3d along = (p_to - p_from).transpose() / way;
-  Eigen::Matrix<double, 1, 2 * err::clone_size> J;  // of the way, by the errors of both clones
-  J << along * skew(p_from), -along, -along * skew(p_to), along;
   const auto clone_of = [&](std::ptrdiff_t sighting) {
-    return clone_index(ekf.state(), track.observations[static_cast<std::size_t>(sighting)].frame);
+    return clone_index(x, track.observations[static_cast<std::size_t>(sighting)].frame);
   };
-  const int from = clone_of(0);
-  const int to = clone_of(farthest - sightings_.begin());
+  const Eigen::Vector3d way = farthest->p_WC - p_from;
+  const Eigen::Vector3d along = way.normalized();
+  const Eigen::Matrix3d covariance = way_covariance(clone_of(0), clone_of(farthest - sightings_.begin()), again, ekf);
+  return kNotAveraged * std::abs(inverse_depth) * along.dot(covariance * along) / way.norm();
+}
+
+Eigen::Matrix3d TrackUpdate::way_covariance(int from, int to, bool again, const Ekf& ekf) const {
   const Covariance& covariance = ekf.covariance();
   const auto P = [&](int a, int b) -> ClonePair {
     if (again) return covariance.corrected(err::clone(a), err::clone(b));
@@ -175,7 +192,10 @@ double TrackUpdate::left_out(const Track& track, double inverse_depth, bool agai
   };
   Eigen::Matrix<double, 2 * err::clone_size, 2 * err::clone_size> P_both;
   P_both << P(from, from), P(from, to), P(to, from), P(to, to);
-  return std::abs(inverse_depth) * (J * P_both * J.transpose()).value() / way;
+  const auto place = [this](int clone) { return skew(cameras_[2 * static_cast<std::size_t>(clone)].p_WC); };
+  Eigen::Matrix<double, 3, 2 * err::clone_size> J;  // by the errors of both clones
+  J << place(from), -Eigen::Matrix3d::Identity(), -place(to), Eigen::Matrix3d::Identity();
+  return J * P_both * J.transpose();
 }
 
 /// The newest that both cameras saw: what is wrong with the others is much the same.

@@ -3,10 +3,12 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <vector>
 
 #include "ear/filter_config.h"
 #include "filter/ekf/ekf.h"
+#include "filter/ekf/iterated_update.h"
 #include "filter/ekf/records.h"
 #include "filter/sources/cameras/feature_update.h"
 #include "filter/sources/cameras/lens_pattern.h"
@@ -14,20 +16,26 @@
 
 namespace ear {
 
+/// Which tracks update the state.
+enum class UsedTracks : std::uint8_t {
+  ended,       ///< those that do not go on to the newest clone
+  oldest_too,  ///< and those that reach back to the oldest one, which is marginalised next
+  all          ///< after a gap: those that go on first, all together
+};
+
 class TrackUpdate {
  public:
   /// `focal_px`: pixels per unit of normalized image coordinates.
   TrackUpdate(const FilterConfig& config, double focal_px);
 
-  /// Updates the state with the tracks that do not go on to the newest clone, and with those that reach back to the
-  /// oldest one if that is marginalised next. Their observations are used up.
-  void update(bool oldest_goes, CameraUpdate calibration, TrackTable& tracks, Ekf& ekf, Records& records);
+  /// Updates the state with the tracks. Their observations are used up.
+  void update(UsedTracks use, CameraUpdate calibration, TrackTable& tracks, Ekf& ekf, Records& records);
 
   [[nodiscard]] const LensPattern& lens_pattern() const { return lens_pattern_; }
   void reset() { lens_pattern_.reset(); }
 
  private:
-  void select(const State& x, bool oldest_goes, const TrackTable& tracks);
+  void select(const State& x, UsedTracks use, const TrackTable& tracks);
   /// The rows of the selected tracks, by the poses of `at`. `again`: where an update found the state to be.
   void linearize(const TrackTable& tracks, const State& at, bool again, const Ekf& ekf);
   /// The rows become those of where they move the state to.
@@ -36,6 +44,8 @@ class TrackUpdate {
   /// Normalized: what the linearisation leaves out of where the feature of `sightings_`, with this inverse depth [1/m],
   /// is seen.
   [[nodiscard]] double left_out(const Track& track, double inverse_depth, bool again, const Ekf& ekf) const;
+  /// Of the left camera's way from one clone to another [m^2]. `again`: after the update at hand.
+  [[nodiscard]] Eigen::Matrix3d way_covariance(int from, int to, bool again, const Ekf& ekf) const;
   void add_to_pattern(const Track& track, const CameraState& cameras);
   void log(const Ekf& ekf, Records& records) const;
 
@@ -49,7 +59,8 @@ class TrackUpdate {
   double focal_px_;
   std::array<Residuals, 2> residuals_;
   LensPattern lens_pattern_;
-  double most_left_out_ = 0.0;  ///< of all tracks, over the noise of an image
+  UsedTracks use_ = UsedTracks::ended;  ///< now
+  double most_left_out_ = 0.0;          ///< of all tracks, over the noise of an image
   // Memory that is used again.
   FeatureInformation information_;
   std::vector<CameraPose> cameras_;
@@ -57,8 +68,7 @@ class TrackUpdate {
   std::vector<LinearizedObservation> observations_;
   std::vector<std::size_t> selected_;
   std::vector<bool> used_;  ///< of these
-  State found_;             ///< where an update would move the state
-  Eigen::VectorXd moved_;   ///< there, from the state, as an error
+  IteratedUpdate iterated_;
 };
 
 }  // namespace ear
