@@ -100,7 +100,8 @@ bool Cameras::bridge(const FeatureFrame& frame, Ekf& ekf) {
 }
 
 /// The features that show the motion count again: here they count a sixteenth, and still bring the state to where it is
-/// linear. Where the turn is not known well then, its square moves them by more than noise, and they count at once.
+/// linear. The square of the turn that is not known then moves them all alike, where noise averages out: if it is more
+/// than that, they count at once.
 void Cameras::apply_bridge(const StereoMotion& motion, Ekf& ekf) {
   const State& x = ekf.state();
   const Eigen::Matrix3d R_WB0 = x.clones.back().T_WB.R;
@@ -128,7 +129,7 @@ void Cameras::apply_bridge(const StereoMotion& motion, Ekf& ekf) {
       });
   ekf.apply(H, 0, r, CameraUpdate::considered);
   const double left_out = 0.5 * turn_variance_since_clone(ekf);
-  gap_is_wide_ = left_out > frame_check_.sigma();
+  gap_is_wide_ = left_out * std::sqrt(motion.matches) > frame_check_.sigma();
 }
 
 FrameAgreement Cameras::compare(const FeatureFrame& frame, const Ekf& ekf) {
