@@ -3,10 +3,26 @@
 #include <algorithm>
 #include <cmath>
 
+#include "filter/ingest/stream_clock.h"
+
 namespace ear {
 namespace {
 
 constexpr double kUnseenSpeed = 1.0;  // [m/s] chosen: that the vehicle may have gained since it was lost
+
+/// Of a turn by the samples [rad^2]: their noise, with what those that are missing leave; and where it may be the clock
+/// that jumped, the time is not known. As in Ekf::inflate_time.
+double turn_variance(TimeNs from_ns, TimeNs to_ns, const Eigen::Vector3d& b_g, const ImuBuffer& imu,
+                     double gyro_noise) {
+  double variance = 0.0;
+  imu.for_each_piece(
+      from_ns, to_ns,
+      [&](const Eigen::Vector3d& gyro_B, const Eigen::Vector3d&, double dt, const ImuNoiseFactors& noise) {
+        variance += dt * std::pow(noise.gyro * gyro_noise, 2);
+        if (is_clock_jump(dt)) variance += dt * dt * (gyro_B - b_g).squaredNorm();
+      });
+  return variance;
+}
 
 /// How far it may have gone since it was last known.
 double unseen_path(const NavState& last, double seconds) { return seconds * (last.v_W.norm() + kUnseenSpeed); }
@@ -63,14 +79,16 @@ MapAlignment align_after_restart(const Estimate& last_good, const ImuState& x, c
   const TimeNs from_ns = std::min(last.t_ns, x.t_ns);
   const TimeNs to_ns = std::max(last.t_ns, x.t_ns);
   const double since = seconds_between(from_ns, to_ns);
+  constexpr double kUnknownYaw = M_PI * M_PI / 3.0;  // variance
   double yaw_variance = variance(estimate_error::rotation + 2);
   if (imu[0].t_ns <= from_ns) {
     const Eigen::Matrix3d turned = gyro_rotation(from_ns, to_ns, last.b_g, imu);
     last.q_WB = last.q_WB * Eigen::Quaterniond(last.t_ns <= x.t_ns ? turned : Eigen::Matrix3d(turned.transpose()));
-    yaw_variance +=
-        since * since * variance.segment<3>(estimate_error::gyro_bias).maxCoeff() + since * gyro_noise * gyro_noise;
+    yaw_variance += since * since * variance.segment<3>(estimate_error::gyro_bias).maxCoeff() +
+                    turn_variance(from_ns, to_ns, last.b_g, imu, gyro_noise);
+    yaw_variance = std::min(yaw_variance, kUnknownYaw);
   } else {
-    yaw_variance = M_PI * M_PI / 3.0;
+    yaw_variance = kUnknownYaw;
   }
   const double path = unseen_path(last, since);
   const double position_sigma = std::sqrt(variance.segment<3>(estimate_error::position).maxCoeff() + path * path);

@@ -1,10 +1,14 @@
 // Two worlds of one vehicle, before and after a restart.
 #include <doctest/doctest.h>
 
+#include <cmath>
+
 #include "filter/ekf/so3.h"
 #include "filter/start/map_alignment.h"
+#include "tests/support/about.h"
 
 using namespace ear;
+using ear::test::about;
 
 namespace {
 
@@ -79,4 +83,28 @@ TEST_CASE("map_alignment: a state in doubt is as uncertain as the way that it ma
   alignment.doubt(last_W, 6'000'000'000);
   CHECK(alignment.position_sigma == doctest::Approx(6.0));
   CHECK(alignment.to_world(last_W).p_WB == last_W.p_WB);
+}
+
+TEST_CASE("map_alignment: the yaw is known as the gyroscope shows it, and less where its samples are missing") {
+  constexpr double kNoise = 1e-3;  // [rad/s/sqrt(Hz)]
+  constexpr double kRate = 0.4;    // [rad/s] about z
+  const auto yaw_sigma = [&](double gap, double factor) {
+    ImuBuffer imu(1024);
+    for (int i = 0; i <= 600; ++i) {  // 3 s, and what is missing after the first of them
+      const double t = 5e-3 * i + (i > 200 ? gap : 0.0);
+      imu.push({static_cast<TimeNs>(1e9 * t), {0.0, 0.0, kRate}, {0.0, 0.0, 9.80665}}, {i == 201 ? factor : 1.0, 1.0});
+    }
+    Estimate last;
+    last.covariance.setZero();
+    ImuState x;
+    x.t_ns = static_cast<TimeNs>(1e9 * (3.0 + gap));
+    const MapAlignment alignment = align_after_restart(last, x, imu, kNoise);
+    const Eigen::Vector3d ahead = alignment.q_WA * Eigen::Vector3d::UnitX();
+    CHECK(std::abs(std::remainder(std::atan2(ahead.y(), ahead.x()) - kRate * (3.0 + gap), 2.0 * M_PI)) < 1e-6);
+    return alignment.yaw_sigma;
+  };
+  CHECK(yaw_sigma(0.0, 1.0) == about(kNoise * std::sqrt(3.0), 0.01));
+  CHECK(yaw_sigma(1.5, 1.0) == about(1.5 * kRate, 0.01));  // how long it took is not known
+  CHECK(yaw_sigma(1.5, 300.0) == about(std::hypot(1.5 * kRate, 300.0 * kNoise * std::sqrt(1.5)), 0.01));
+  CHECK(yaw_sigma(1.5, 1e4) == about(M_PI / std::sqrt(3.0), 0.01));  // any yaw
 }
