@@ -82,8 +82,7 @@ MapAlignment align_after_restart(const Estimate& last_good, const ImuState& x, c
   const double of_any_yaw = M_PI * M_PI / 3.0;  // variance
   double yaw_variance = variance(estimate_error::rotation + 2);
   if (imu[0].t_ns <= from_ns) {
-    const Eigen::Matrix3d turned = gyro_rotation(from_ns, to_ns, last.b_g, imu);
-    last.q_WB = last.q_WB * Eigen::Quaterniond(last.t_ns <= x.t_ns ? turned : Eigen::Matrix3d(turned.transpose()));
+    last.q_WB = last.q_WB * Eigen::Quaterniond(gyro_rotation(last.t_ns, x.t_ns, last.b_g, imu));
     yaw_variance += since * since * variance.segment<3>(estimate_error::gyro_bias).maxCoeff() +
                     turn_variance(from_ns, to_ns, last.b_g, imu, gyro_noise);
     yaw_variance = std::min(yaw_variance, of_any_yaw);

@@ -69,8 +69,8 @@ struct ExcessTurn {
 
 /// Least squares over rotation and translation: the points seen in frame 0, projected into both cameras of frame 1.
 /// Observations further off than `huber` standard deviations weigh less. `sigma`: one observation, normalized; `start`:
-/// where to begin, `settled` [rad, m]: steps with which it ends. Nothing if the points do not show it, or most of them
-/// do not move as one body.
+/// where to begin, `settled` [rad, m]: steps with which it ends. Nothing if the points do not show it, most of them do
+/// not move as one body, or the steps do not end.
 [[nodiscard]] std::optional<StereoMotion> stereo_motion(const std::vector<StereoMatch>& matches,
                                                         const CameraState& cameras, const Pose& start, double sigma,
                                                         double settled = 1e-8, Kernels kernels = Kernels::best);

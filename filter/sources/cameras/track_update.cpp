@@ -139,8 +139,7 @@ bool TrackUpdate::add(const Track& track, const State& x, bool again, const Ekf&
   });
   const std::optional<InverseDepthPoint> point = triangulate(sightings_);
   if (!point) return false;
-  const double sigma = config_.feature_sigma_px / focal_px_;
-  const double unseen = left_out(track, point->inverse_depth, again, ekf) / sigma;
+  const double unseen = left_out(track, point->inverse_depth, again, ekf) / sigma();
   most_left_out_ = std::max(most_left_out_, unseen);
   const double noise = std::hypot(1.0, unseen);
   observations_.clear();
@@ -150,8 +149,8 @@ bool TrackUpdate::add(const Track& track, const State& x, bool again, const Ekf&
     residuals_[camera].squares_px2 += focal_px_ * focal_px_ * observations_.back().residual.squaredNorm();
     residuals_[camera].count += 2;
   });
-  return information_.add(observations_, sigma, config_.huber_px / config_.feature_sigma_px, ekf.covariance().matrix(),
-                          ekf.gate());
+  return information_.add(observations_, sigma(), config_.huber_px / config_.feature_sigma_px,
+                          ekf.covariance().matrix(), ekf.gate());
 }
 
 /// Where a feature is seen depends on the product of how near it is and how far the camera moved, of which the filter
@@ -160,14 +159,14 @@ bool TrackUpdate::add(const Track& track, const State& x, bool again, const Ekf&
 /// for a gap: docs/decisions/0066.
 double TrackUpdate::left_out(const Track& track, double inverse_depth, bool again, const Ekf& ekf) const {
   const State& x = ekf.state();
-  const std::size_t by_right = sightings_.size() - track.observations.size();
+  const auto clone_of = [&](const TrackObservation& o) { return clone_index(x, o.frame); };
+  const std::vector<TrackObservation>& seen = track.observations;
+  const std::size_t by_right = sightings_.size() - seen.size();
   if (by_right > 0) {
     if (use_ != UsedTracks::all) return 0.0;
-    const double sigma = config_.feature_sigma_px / focal_px_ / std::sqrt(static_cast<double>(by_right));
-    const int from = clone_index(x, track.observations.front().frame);
-    const int to = clone_index(x, track.observations.back().frame);
-    const double variance = way_covariance(from, to, again, ekf).trace();
-    return stereo_inverse_depth_sigma(x.camera, sigma) * std::sqrt(std::max(0.0, variance));
+    const double mean_sigma = sigma() / std::sqrt(static_cast<double>(by_right));
+    const double variance = way_covariance(clone_of(seen.front()), clone_of(seen.back()), again, ekf).trace();
+    return stereo_inverse_depth_sigma(x.camera, mean_sigma) * std::sqrt(std::max(0.0, variance));
   }
   const Eigen::Vector3d& p_from = sightings_.front().p_WC;
   const auto farthest =
@@ -175,12 +174,10 @@ double TrackUpdate::left_out(const Track& track, double inverse_depth, bool agai
         return (a.p_WC - p_from).squaredNorm() < (b.p_WC - p_from).squaredNorm();
       });
   if (farthest == sightings_.begin()) return 0.0;
-  const auto clone_of = [&](std::ptrdiff_t sighting) {
-    return clone_index(x, track.observations[static_cast<std::size_t>(sighting)].frame);
-  };
   const Eigen::Vector3d way = farthest->p_WC - p_from;
   const Eigen::Vector3d along = way.normalized();
-  const Eigen::Matrix3d covariance = way_covariance(clone_of(0), clone_of(farthest - sightings_.begin()), again, ekf);
+  const TrackObservation& to = *(seen.begin() + (farthest - sightings_.begin()));
+  const Eigen::Matrix3d covariance = way_covariance(clone_of(seen.front()), clone_of(to), again, ekf);
   return kNotAveraged * std::abs(inverse_depth) * along.dot(covariance * along) / way.norm();
 }
 

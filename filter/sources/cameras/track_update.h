@@ -35,6 +35,7 @@ class TrackUpdate {
   void reset() { lens_pattern_.reset(); }
 
  private:
+  [[nodiscard]] double sigma() const { return config_.feature_sigma_px / focal_px_; }  ///< of an observation, usually
   void select(const State& x, UsedTracks use, const TrackTable& tracks);
   /// The rows of the selected tracks, by the poses of `at`. `again`: where an update found the state to be.
   void linearize(const TrackTable& tracks, const State& at, bool again, const Ekf& ekf);
