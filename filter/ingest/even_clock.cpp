@@ -15,9 +15,10 @@ constexpr double kHeldUp = 10.0;  // [s] chosen: no driver is held up so long; m
 }  // namespace
 
 /// The slope of the regression is 1 where stamps say when readings were taken, 0 where their scatter says nothing.
+/// Nor are intervals even whose length does not last: within kHeldUp some reading comes on time.
 bool EvenClock::is_even() const {
   const Regression& r = regression_;
-  if (r.xx <= 0.0) return false;
+  if (!on_time_ || r.xx <= 0.0) return false;
   const double slope = r.xy / r.xx;
   const double variance = (r.yy - slope * r.xy) / std::max(1.0, r.count - 1.0) / r.xx;
   return slope + kClear * std::sqrt(std::max(0.0, variance)) < 0.5;
@@ -53,6 +54,7 @@ void EvenClock::follow(const WheelIncrement& increment, double intervals) {
   even_ns_ = std::min(stamp_ns, later_by(intervals * interval_, even_ns_));
   least_late_ = std::min(least_late_, seconds_between(even_ns_, stamp_ns));
   if (seconds_between(window_ns_, stamp_ns) > kHeldUp) {
+    on_time_ = least_late_ < interval_;
     even_ns_ = later_by(least_late_, even_ns_);
     window_ns_ = stamp_ns;
     least_late_ = std::numeric_limits<double>::infinity();

@@ -36,6 +36,7 @@ class EvenClock {
   TimeNs given_ns_ = 0;      ///< what was made of it
   TimeNs window_ns_ = 0;     ///< since when the least delay is looked for
   double least_late_ = 0.0;  ///< [s]
+  bool on_time_ = false;     ///< some reading of the last such window came within an interval of its time
 };
 
 }  // namespace ear

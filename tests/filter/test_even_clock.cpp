@@ -128,6 +128,18 @@ TEST_CASE("even clock: readings at uneven times, whose stamps are right, stay as
   CHECK_FALSE(result.even);
 }
 
+TEST_CASE("even clock: where the intervals grow longer at once, stamps are believed after ten seconds") {
+  std::mt19937 generator(8);
+  std::vector<Reading> readings;
+  double arrived = 0.0;
+  for (double taken = 10.0; taken < 310.0; taken += taken < 210.0 ? kInterval : 1.08 * kInterval) {
+    arrived = std::max(arrived + 1e-4, taken + std::normal_distribution<double>(0.0, 0.008)(generator));
+    readings.push_back({taken, arrived});
+  }
+  CHECK(run(readings, 210.0).worst < 0.85);  // 8 % of ten seconds; learning the new interval meanwhile takes twice that
+  CHECK(run(readings, 222.0).rms < 0.015);   // the stamps' own scatter is 0.008
+}
+
 TEST_CASE("even clock: a constant delay is not seen, one that ends is") {
   const Result result = run(arriving([](double t) { return held_up(0.0) + (t > 60.0 ? 0.08 : 0.0); }), 80.0);
   CHECK(result.even);
