@@ -198,7 +198,8 @@ HealthMonitor::Frame CommonEstimator::health_frame(bool image, const FrameAgreem
 std::optional<Estimate> CommonEstimator::give(std::optional<Estimate> estimate) {
   if (!estimate || !ekf_.running() || !health_.usable()) return std::nullopt;
   estimate->health = health_.health();
-  if (estimate->health.aiding != Aiding::none) last_good_ = estimate;
+  // The first one, whatever carries it, tells the user where the world begins.
+  if (estimate->health.aiding != Aiding::none || !last_good_) last_good_ = estimate;
   return estimate;
 }
 

@@ -70,7 +70,7 @@ class CommonEstimator : public Estimator {
   ConsistencyCheck consistency_check_;
   HealthMonitor health_;
   MapAlignment alignment_;               ///< of the state's world in that of the estimates
-  std::optional<Estimate> last_good_;    ///< the last estimate that rested on more than inertia
+  std::optional<Estimate> last_good_;    ///< the last that rested on more than inertia, or the first
   std::optional<TimeNs> last_frame_ns_;  ///< camera stamp of the last frame processed
   Records records_;                      ///< of the frame at hand
   Consistency consistency_;              ///< over the interval that ends with it

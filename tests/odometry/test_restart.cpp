@@ -154,6 +154,37 @@ TEST_CASE("restart: rolling, after all clocks were set back") {
   CHECK(restart.first->t < 9.5);
 }
 
+TEST_CASE("restart: where a given start said, and only inertial samples until they were missing") {
+  const simulator::Simulation simulation = simulate("flat1");
+  const double begin = 4.0, gap = 5.0, seen = 8.0;  // [s]
+  const simulator::Truth truth =
+      simulation.truth(simulation.deliveries().front().arrival_ns + static_cast<TimeNs>(1e9 * begin));
+  GivenStart start;
+  start.state.t_ns = truth.t_ns;
+  start.state.q_WB = Eigen::Quaterniond(truth.R_WB);
+  start.state.p_WB = truth.p_WB + Eigen::Vector3d(100.0, 0.0, 0.0);
+  start.state.v_W = truth.v_W;
+  Filter filter(FilterConfig{}, simulation.calibration());
+  filter.start_at(start);
+  const auto hold_back = [=](double t, auto&) { return t < seen ? 0 : 1; };
+  const auto blind = [=](double t, FeatureFrame& frame) {
+    if (t < seen) frame.features.clear();
+    return 1;
+  };
+  const auto lose = [=](double t, auto&) { return t > gap && t < seen ? 0 : 1; };
+  std::vector<Step> steps;
+  run_tapped(simulation, filter, {lose, hold_back, hold_back, blind},
+             [&](double t, const std::optional<Estimate>& estimate) {
+               steps.push_back({t, filter.health(), filter.status(), estimate});
+             });
+  const Restart restart = check_restart(steps);
+  for (const Step& step : steps) {
+    if (step.estimate && step.t < seen) CHECK(step.estimate->health.aiding == Aiding::none);
+  }
+  check_continued(simulation, restart, steps.back());
+  CHECK(restart.first->estimate->state.p_WB.x() > 90.0);
+}
+
 TEST_CASE("restart: after the state or its covariance turned into no numbers, standing, rolling and flying") {
   using Spoil = std::function<void(Filter&)>;
   const std::vector<Spoil> spoils{
