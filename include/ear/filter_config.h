@@ -126,12 +126,12 @@ struct AnomalyConfig {
 };
 
 struct FilterConfig {
-  int window = 12;                     ///< clones kept
-  int max_track_updates = 40;          ///< features used per frame, those with most observations first
-  double feature_sigma_px = 0.6;       ///< one observation of one feature, one axis [px]
-  double huber_px = 1.5;               ///< observations further off than this weigh less [px]
-  double gate_probability = 0.98;      ///< chi-square gate of every feature; wheels and beams weigh less instead
-  double keyframe_parallax_px = 6.0;   ///< a clone with less median parallax to its elder makes room first [px]
+  int window = 12;                    ///< clones kept
+  int max_track_updates = 40;         ///< features used per frame, those with most observations first
+  double feature_sigma_px = 0.6;      ///< one observation of one feature, one axis [px]
+  double huber_px = 1.5;              ///< observations further off than this weigh less [px]
+  double gate_probability = 0.98;     ///< chi-square gate of every feature; wheels and beams weigh less instead
+  double keyframe_parallax_px = 6.0;  ///< a clone with less median parallax to its elder makes room first [px]
   PriorConfig prior;
   StandstillConfig standstill;
   OnlineCalibrationConfig online_calibration;

@@ -38,8 +38,10 @@ struct Step {
 };
 
 std::vector<Step> run(const simulator::Simulation& simulation, const Taps& taps,
-                      const std::function<void(double t, Filter& filter)>& after_step = {}) {
+                      const std::function<void(double t, Filter& filter)>& after_step = {},
+                      const std::optional<GivenStart>& start = {}) {
   Filter filter(FilterConfig{}, simulation.calibration());
+  if (start) filter.start_at(*start);
   std::vector<Step> steps;
   run_tapped(simulation, filter, taps, [&](double t, const std::optional<Estimate>& estimate) {
     steps.push_back({t, filter.health(), filter.status(), estimate});
@@ -164,19 +166,13 @@ TEST_CASE("restart: where a given start said, and only inertial samples until th
   start.state.q_WB = Eigen::Quaterniond(truth.R_WB);
   start.state.p_WB = truth.p_WB + Eigen::Vector3d(100.0, 0.0, 0.0);
   start.state.v_W = truth.v_W;
-  Filter filter(FilterConfig{}, simulation.calibration());
-  filter.start_at(start);
   const auto hold_back = [=](double t, auto&) { return t < seen ? 0 : 1; };
   const auto blind = [=](double t, FeatureFrame& frame) {
     if (t < seen) frame.features.clear();
     return 1;
   };
   const auto lose = [=](double t, auto&) { return t > gap && t < seen ? 0 : 1; };
-  std::vector<Step> steps;
-  run_tapped(simulation, filter, {lose, hold_back, hold_back, blind},
-             [&](double t, const std::optional<Estimate>& estimate) {
-               steps.push_back({t, filter.health(), filter.status(), estimate});
-             });
+  const std::vector<Step> steps = run(simulation, {lose, hold_back, hold_back, blind}, {}, start);
   const Restart restart = check_restart(steps);
   for (const Step& step : steps) {
     if (step.estimate && step.t < seen) CHECK(step.estimate->health.aiding == Aiding::none);
