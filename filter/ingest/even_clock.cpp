@@ -15,7 +15,7 @@ constexpr double kHeldUp = 10.0;  // [s] chosen: no driver is held up so long; m
 }  // namespace
 
 /// The slope of the regression is 1 where stamps say when readings were taken, 0 where their scatter says nothing.
-/// Nor are intervals even whose length does not last: within kHeldUp some reading comes on time.
+/// Intervals whose length does not last are not even either: within kHeldUp some reading comes on time.
 bool EvenClock::is_even() const {
   const Regression& r = regression_;
   if (!on_time_ || r.xx <= 0.0) return false;

@@ -13,6 +13,7 @@
 
 #include "filter/filter.h"
 #include "tests/support/tapped_run.h"
+#include "tests/support/true_start.h"
 
 using namespace ear;
 using namespace ear::test;
@@ -159,13 +160,8 @@ TEST_CASE("restart: rolling, after all clocks were set back") {
 TEST_CASE("restart: where a given start said, and only inertial samples until they were missing") {
   const simulator::Simulation simulation = simulate("flat1");
   const double begin = 4.0, gap = 5.0, seen = 8.0;  // [s]
-  const simulator::Truth truth =
-      simulation.truth(simulation.deliveries().front().arrival_ns + static_cast<TimeNs>(1e9 * begin));
-  GivenStart start;
-  start.state.t_ns = truth.t_ns;
-  start.state.q_WB = Eigen::Quaterniond(truth.R_WB);
-  start.state.p_WB = truth.p_WB + Eigen::Vector3d(100.0, 0.0, 0.0);
-  start.state.v_W = truth.v_W;
+  GivenStart start = true_start(simulation, begin);
+  start.state.p_WB.x() += 100.0;
   const auto hold_back = [=](double t, auto&) { return t < seen ? 0 : 1; };
   const auto blind = [=](double t, FeatureFrame& frame) {
     if (t < seen) frame.features.clear();

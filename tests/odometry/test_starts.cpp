@@ -12,6 +12,7 @@
 #include "filter/filter.h"
 #include "src/health_text.h"
 #include "tests/support/about.h"
+#include "tests/support/true_start.h"
 #include "tools/experiments/replay_simulation.h"
 #include "tools/simulator/simulation.h"
 
@@ -166,16 +167,6 @@ Outcome run(const simulator::Simulation& simulation, const Vehicle& vehicle) {
           " m, scale ", outcome.scale, ", NEES ", outcome.nees_position, " and ", outcome.nees_rotation, ", lost ",
           outcome.lost, " of ", outcome.frames, "; ", std::string(to_text(outcome.reason)));
   return outcome;
-}
-
-GivenStart true_start(const simulator::Simulation& simulation, double t) {
-  const simulator::Truth truth = simulation.truth(simulation.frame_times().front() + static_cast<TimeNs>(1e9 * t));
-  GivenStart start;
-  start.state.t_ns = truth.t_ns;
-  start.state.q_WB = Eigen::Quaterniond(truth.R_WB);
-  start.state.p_WB = truth.p_WB;
-  start.state.v_W = truth.v_W;
-  return start;
 }
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
