@@ -3,11 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "filter/ingest/limits.h"
+
 namespace ear {
 namespace {
 
 constexpr double kPrior = 4.0;          // innovations that the usual noise counts for; measured: 4 to 16 differ little
-constexpr double kFitting = 1.0 / 3.0;  // chosen: the least weight of a sensor that fits, three standard deviations
 constexpr int kIterations = 3;          // chosen: of the two equations of the belief; more change nothing that matters
 
 }  // namespace
@@ -39,6 +40,6 @@ double NoiseScore::add(double residual, const Expected& expected, TimeNs t_ns) {
 
 double NoiseScore::weight() const { return 1.0 / std::sqrt(factor(0.0, 0.0)); }
 
-bool NoiseScore::fits() const { return weight() > kFitting; }
+bool NoiseScore::fits() const { return weight() > 1.0 / kClear; }
 
 }  // namespace ear

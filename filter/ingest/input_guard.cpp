@@ -43,7 +43,8 @@ ImuVerdict InputGuard::judge(const ImuSample& sample) {
     return verdict;
   }
   const bool later = !imu_stamps_.newest() || sample.t_ns > *imu_stamps_.newest();
-  if (later && imu_repeats_.repeats(sample)) {
+  const RepeatGuard<6>::Values values = (RepeatGuard<6>::Values() << sample.gyro_B, sample.accel_B).finished();
+  if (later && imu_repeats_.repeats(values)) {
     ++counts.repeated;
     verdict.repeated = true;
     return verdict;

@@ -12,7 +12,6 @@ namespace {
 
 constexpr double kUnevenness = 0.004;  // [m] chosen: of the ground under a beam against the plane
 constexpr double kClimbWalk = 0.3;     // [m/s/sqrt(s)] chosen
-constexpr double kReturnGate = 2.0;    // chosen: standard deviations, of a beam that disagreed before; else kClear
 constexpr double kSteepest = 0.8;      // [rad] chosen: ground that is tilted more is none
 constexpr double kUpTime = 3.0;        // [s] chosen: over which the specific force is against gravity in the mean
 
@@ -54,7 +53,7 @@ void GroundTracker::strike() { P_(kClimb, kClimb) += kFlightSpeed * kFlightSpeed
 
 void GroundTracker::suppose_height(double level, double sigma) {
   const Vector H = Vector::Unit(kHeight);
-  if (passes(H, level - height(), sigma * sigma, kReturnGate)) update(H, level - height(), sigma * sigma);
+  if (passes(H, level - height(), sigma * sigma, kClear)) update(H, level - height(), sigma * sigma);
 }
 
 int GroundTracker::update(const LaserSample& sample) {
@@ -78,16 +77,16 @@ int GroundTracker::update(const LaserSample& sample) {
   return agreeing;
 }
 
-/// A return that is not always the same: noise makes each reading of a working beam another one.
+/// A return that is not always the same.
 bool GroundTracker::usable(Beam& beam, double range) const {
-  beam.same = range == beam.last ? beam.same + 1 : 1;
-  beam.last = range;
-  return !beam.stuck() && is_return(range, lasers_);
+  const bool seen = is_return(range, lasers_);
+  beam.stuck = seen && beam.repeats.repeats(RepeatGuard<1>::Values(range));
+  return seen && !beam.stuck;
 }
 
 std::bitset<kMaxBeams> GroundTracker::stuck_beams() const {
   std::bitset<kMaxBeams> stuck;
-  for (std::size_t i = 0; i < beams_.size(); ++i) stuck[i] = beams_[i].stuck();
+  for (std::size_t i = 0; i < beams_.size(); ++i) stuck[i] = beams_[i].stuck;
   return stuck;
 }
 
@@ -105,9 +104,7 @@ bool GroundTracker::update_with_hit(Beam& beam, const Eigen::Vector3d& d_B, cons
   const double residual = -(n_B().dot(hit_B) + radius_ + height());
   const double noise = n_B().dot(d_B) * lasers_.noise;
   const double variance = noise * noise + kUnevenness * kUnevenness;
-  beam.agrees = passes(H, residual, variance, beam.agrees < kNoChance ? kReturnGate : kClear)
-                    ? std::min(beam.agrees + 1, kNoChance)
-                    : 0;
+  beam.agrees = passes(H, residual, variance, kClear) ? std::min(beam.agrees + 1, kNoChance) : 0;
   if (beam.agrees < kNoChance) return false;
   update(H, residual, variance);
   return true;

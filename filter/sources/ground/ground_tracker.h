@@ -15,6 +15,7 @@
 #include "ear/filter_config.h"
 #include "ear/types.h"
 #include "filter/ingest/beam_ranges.h"
+#include "filter/ingest/repeat_guard.h"
 
 namespace ear {
 
@@ -54,14 +55,13 @@ class GroundTracker {
   using Vector = Eigen::Matrix<double, kSize, 1>;
   using Matrix = Eigen::Matrix<double, kSize, kSize>;
 
-  /// Chosen: readings in a row that are equal, or agree again; noise makes two equal ones a chance of some percent.
+  /// Chosen: a beam that disagreed is used again after so many readings in a row that agree.
   static constexpr int kNoChance = 5;
   struct Beam {
-    double last = 0.0;                ///< range [m]
-    int same = 0;                     ///< readings in a row with this range
-    int agrees = kNoChance;           ///< readings in a row; a beam that disagreed is used again after some that agree
+    RepeatGuard<1> repeats;
+    bool stuck = false;               ///< its last range was the one before again, and that was no chance
+    int agrees = kNoChance;           ///< readings in a row
     std::optional<TimeNs> usable_ns;  ///< when its range last was one
-    [[nodiscard]] bool stuck() const { return same >= kNoChance; }
   };
 
   [[nodiscard]] bool usable(Beam& beam, double range) const;
