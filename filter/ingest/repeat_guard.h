@@ -1,5 +1,5 @@
-// Readings that repeat. Noise makes each one another: a driver that gives the last one again has no new one. Sensors that
-// read in coarse steps, and drivers that are asked too fast, repeat as well; how often they do shows it.
+// Readings that repeat. Noise makes each one another: a driver that gives the last one again has no new one. Sensors
+// that read in coarse steps, and drivers that are asked too fast, repeat as well; how often they do shows it.
 // docs/ingest.md, "Samples that repeat".
 #pragma once
 

@@ -12,7 +12,6 @@ namespace {
 
 constexpr double kUnevenness = 0.004;  // [m] chosen: of the ground under a beam against the plane
 constexpr double kClimbWalk = 0.3;     // [m/s/sqrt(s)] chosen
-constexpr double kSteepest = 0.8;      // [rad] chosen: ground that is tilted more is none
 constexpr double kUpTime = 3.0;        // [s] chosen: over which the specific force is against gravity in the mean
 
 }  // namespace
@@ -73,7 +72,7 @@ int GroundTracker::update(const LaserSample& sample) {
   }
   if (agreeing > 0) lost_ = 0;
   if (agreeing == 0 && readings >= 2) ++lost_;
-  if (lost_ >= kConfirmed || (!up_B_.isZero() && n_B().dot(up_B_) < std::cos(kSteepest))) forget();
+  if (lost_ >= kConfirmed) forget();
   return agreeing;
 }
 
