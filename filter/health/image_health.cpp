@@ -10,7 +10,6 @@ namespace ear {
 namespace {
 
 constexpr double kSomeOff = 0.1;        // chosen: of the features off their place; a camera may be faulty
-constexpr double kSparse = 0.4;         // chosen: of the usual number of features, or share of them in both cameras
 constexpr double kTracksMemory = 20.0;  // [s] chosen
 
 /// Are clearly more than kSomeOff of so many features off their place? `share`: those that are.
@@ -71,7 +70,7 @@ void ImageHealth::judge(TimeNs t_ns, bool running, const FrameAgreement& seen, c
   const bool known = running && seen.matches > 0;
   const int tracks = statistics.tracks;
   const bool blind = tracks < kFewFeatures;
-  const bool poor = blind || tracks < kSparse * usual_.tracks || seen.noise > 1.0;
+  const bool poor = blind || tracks < kMajority * usual_.tracks || seen.noise > 1.0;
   const double share = std::max(interval_ / kTracksMemory, 1.0 / (1.0 + usual_.images));
   usual_.tracks += share * (tracks - usual_.tracks);
   ++usual_.images;
@@ -81,7 +80,7 @@ void ImageHealth::judge(TimeNs t_ns, bool running, const FrameAgreement& seen, c
   carrying_.add(blind || misfit() || (known && seen.left > kMajority), t_ns);
   left_.add(poor || misfit() || (known && some_off(seen.left, seen.matches)), t_ns);
   if (cameras_ == 2 && !seen.right_skipped) {
-    const bool one_eyed = statistics.stereo < std::max<double>(kFewFeatures, kSparse * usual_.stereo * tracks);
+    const bool one_eyed = statistics.stereo < std::max<double>(kFewFeatures, kMajority * usual_.stereo * tracks);
     usual_.stereo += share * (static_cast<double>(statistics.stereo) / std::max(1, tracks) - usual_.stereo);
     right_.add(poor || one_eyed || (known && some_off(seen.right, seen.matches)), t_ns);
   }
