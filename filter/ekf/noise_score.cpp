@@ -8,8 +8,8 @@
 namespace ear {
 namespace {
 
-constexpr double kPrior = 4.0;          // innovations that the usual noise counts for; measured: 4 to 16 differ little
-constexpr int kIterations = 3;          // chosen: of the two equations of the belief; more change nothing that matters
+constexpr double kPrior = 4.0;  // innovations that the usual noise counts for; measured: 4 to 16 differ little
+constexpr int kIterations = 3;  // chosen: of the two equations of the belief; more change nothing that matters
 
 }  // namespace
 
