@@ -52,7 +52,7 @@ void GroundTracker::strike() { P_(kClimb, kClimb) += kFlightSpeed * kFlightSpeed
 
 void GroundTracker::suppose_height(double level, double sigma) {
   const Vector H = Vector::Unit(kHeight);
-  if (passes(H, level - height(), sigma * sigma, kClear)) update(H, level - height(), sigma * sigma);
+  if (passes(H, level - height(), sigma * sigma)) update(H, level - height(), sigma * sigma);
 }
 
 int GroundTracker::update(const LaserSample& sample) {
@@ -103,14 +103,14 @@ bool GroundTracker::update_with_hit(Beam& beam, const Eigen::Vector3d& d_B, cons
   const double residual = -(n_B().dot(hit_B) + radius_ + height());
   const double noise = n_B().dot(d_B) * lasers_.noise;
   const double variance = noise * noise + kUnevenness * kUnevenness;
-  beam.agrees = passes(H, residual, variance, kClear) ? std::min(beam.agrees + 1, kNoChance) : 0;
+  beam.agrees = passes(H, residual, variance) ? std::min(beam.agrees + 1, kNoChance) : 0;
   if (beam.agrees < kNoChance) return false;
   update(H, residual, variance);
   return true;
 }
 
-bool GroundTracker::passes(const Vector& H, double residual, double variance, double gate) const {
-  return residual * residual < gate * gate * (H.dot(P_ * H) + variance);
+bool GroundTracker::passes(const Vector& H, double residual, double variance) const {
+  return residual * residual < kClear * kClear * (H.dot(P_ * H) + variance);
 }
 
 void GroundTracker::update(const Vector& H, double residual, double variance) {

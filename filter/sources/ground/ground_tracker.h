@@ -69,7 +69,7 @@ class GroundTracker {
   void forget();
   void widen_normal(double variance);
   bool update_with_hit(Beam& beam, const Eigen::Vector3d& d_B, const Eigen::Vector3d& hit_B);
-  [[nodiscard]] bool passes(const Vector& H, double residual, double variance, double gate) const;
+  [[nodiscard]] bool passes(const Vector& H, double residual, double variance) const;
   void update(const Vector& H, double residual, double variance);
 
   LaserCalibration lasers_;
