@@ -43,8 +43,7 @@ ImuVerdict InputGuard::judge(const ImuSample& sample) {
     return verdict;
   }
   const bool later = !imu_stamps_.newest() || sample.t_ns > *imu_stamps_.newest();
-  const RepeatGuard<6>::Values values = (RepeatGuard<6>::Values() << sample.gyro_B, sample.accel_B).finished();
-  if (later && imu_repeats_.repeats(values)) {
+  if (later && imu_repeats_.repeats(sample)) {
     ++counts.repeated;
     verdict.repeated = true;
     return verdict;

@@ -67,7 +67,7 @@ class InputGuard {
   std::size_t beam_count_;
   InputCounts counts_;
   StampGuard imu_stamps_;
-  RepeatGuard<6> imu_repeats_;
+  RepeatGuard imu_repeats_;
   std::optional<TimeNs> last_encoder_ns_;  ///< the newest reading accepted
   std::optional<TimeNs> last_laser_ns_;    ///< the same
   FeatureFrame plausible_frame_;

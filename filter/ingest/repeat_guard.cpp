@@ -7,25 +7,23 @@
 
 namespace ear {
 
-template <int Size>
-void RepeatGuard<Size>::learn(const Values& step) {
+void RepeatGuard::learn(const Values& step) {
   count_ = std::min<double>(count_ + 1.0, kCapacity);
   share_ += ((step.isZero(0.0) ? 1.0 : 0.0) - share_) / count_;
   const Values unlike =
-      ((step - step_).array().abs() > kAlike * (step.array().abs() + step_.array().abs())).template cast<double>();
+      ((step - step_).array().abs() > kAlike * (step.array().abs() + step_.array().abs())).cast<double>();
   rough_ += (unlike - rough_) / count_;
   step_ = step;
 }
 
-/// Is there noise in any value? Where there is none, as in a simulation, readings repeat at rest.
-template <int Size>
-bool RepeatGuard<Size>::noisy() const {
-  return rough_.maxCoeff() > kAlike;
-}
+/// Is there noise in any axis? Where there is none, as in a simulation, samples repeat at rest.
+bool RepeatGuard::noisy() const { return rough_.maxCoeff() > kAlike; }
 
-/// What a run says of all this counts after it. No chance is what is that of kClear standard deviations in two sensors.
-template <int Size>
-bool RepeatGuard<Size>::repeats(const Values& values) {
+/// What a run says of all this counts after it. No chance is what is that of kClear standard deviations in both
+/// sensors.
+bool RepeatGuard::repeats(const ImuSample& sample) {
+  Values values;
+  values << sample.gyro_B, sample.accel_B;
   if (!last_) {
     last_ = values;
     return false;
@@ -39,8 +37,5 @@ bool RepeatGuard<Size>::repeats(const Values& values) {
   last_ = values;
   return false;
 }
-
-template class RepeatGuard<1>;
-template class RepeatGuard<6>;
 
 }  // namespace ear

@@ -1,9 +1,7 @@
 #include <doctest/doctest.h>
 
-#include <cmath>
 #include <functional>
 #include <limits>
-#include <random>
 
 #include "filter/sources/ground/ground_tracker.h"
 #include "tests/support/about.h"
@@ -117,21 +115,4 @@ TEST_CASE("ground tracker: a reading that was ahead of time takes nothing from t
   flight.step(0.3, [](LaserSample& sample) { sample.t_ns += 3'600'000'000'000; });
   for (int i = 0; i < 10; ++i) CHECK(flight.step(0.3) == 3);
   CHECK(flight.tracker.height() == about(0.3, 0.05));
-}
-
-TEST_CASE("ground tracker: range finders of coarse steps say the same again and again at rest, and are not stuck") {
-  const VehiclePose rest;
-  const Calibration calibration = vehicle_with_beams();
-  GroundTracker tracker(*calibration.lasers, *calibration.encoder, OdometerConfig{});
-  std::mt19937_64 rng(13);
-  int stuck = 0, refused = 0;
-  for (int i = 0; i < 20000; ++i) {
-    LaserSample sample = read_beams(calibration, i * TimeNs{20'000'000}, rest, 0.002, rng);
-    for (double& range : sample.range) range = 0.01 * std::round(range / 0.01);
-    tracker.turn(Eigen::Vector3d::Zero(), {0.0, 0.0, kUp}, 0.02);
-    refused += tracker.update(sample) < 3 ? 1 : 0;
-    stuck += tracker.stuck_beams().any() ? 1 : 0;
-  }
-  CHECK(stuck < 20);  // a thousandth
-  CHECK(refused < 200);
 }

@@ -12,6 +12,8 @@ namespace {
 
 constexpr double kUnevenness = 0.004;  // [m] chosen: of the ground under a beam against the plane
 constexpr double kClimbWalk = 0.3;     // [m/s/sqrt(s)] chosen
+constexpr double kReturnGate = 2.0;    // chosen: standard deviations, of a beam that disagreed before; else kClear
+constexpr double kSteepest = 0.8;      // [rad] chosen: ground that is tilted more is none
 constexpr double kUpTime = 3.0;        // [s] chosen: over which the specific force is against gravity in the mean
 
 }  // namespace
@@ -52,7 +54,7 @@ void GroundTracker::strike() { P_(kClimb, kClimb) += kFlightSpeed * kFlightSpeed
 
 void GroundTracker::suppose_height(double level, double sigma) {
   const Vector H = Vector::Unit(kHeight);
-  if (passes(H, level - height(), sigma * sigma)) update(H, level - height(), sigma * sigma);
+  if (passes(H, level - height(), sigma * sigma, kReturnGate)) update(H, level - height(), sigma * sigma);
 }
 
 int GroundTracker::update(const LaserSample& sample) {
@@ -72,20 +74,20 @@ int GroundTracker::update(const LaserSample& sample) {
   }
   if (agreeing > 0) lost_ = 0;
   if (agreeing == 0 && readings >= 2) ++lost_;
-  if (lost_ >= kConfirmed) forget();
+  if (lost_ >= kConfirmed || (!up_B_.isZero() && n_B().dot(up_B_) < std::cos(kSteepest))) forget();
   return agreeing;
 }
 
-/// A return that is not always the same.
+/// A return that is not always the same: noise makes each reading of a working beam another one.
 bool GroundTracker::usable(Beam& beam, double range) const {
-  const bool seen = is_return(range, lasers_);
-  beam.stuck = seen && beam.repeats.repeats(RepeatGuard<1>::Values(range));
-  return seen && !beam.stuck;
+  beam.same = range == beam.last ? beam.same + 1 : 1;
+  beam.last = range;
+  return !beam.stuck() && is_return(range, lasers_);
 }
 
 std::bitset<kMaxBeams> GroundTracker::stuck_beams() const {
   std::bitset<kMaxBeams> stuck;
-  for (std::size_t i = 0; i < beams_.size(); ++i) stuck[i] = beams_[i].stuck;
+  for (std::size_t i = 0; i < beams_.size(); ++i) stuck[i] = beams_[i].stuck();
   return stuck;
 }
 
@@ -103,14 +105,16 @@ bool GroundTracker::update_with_hit(Beam& beam, const Eigen::Vector3d& d_B, cons
   const double residual = -(n_B().dot(hit_B) + radius_ + height());
   const double noise = n_B().dot(d_B) * lasers_.noise;
   const double variance = noise * noise + kUnevenness * kUnevenness;
-  beam.agrees = passes(H, residual, variance) ? std::min(beam.agrees + 1, kNoChance) : 0;
+  beam.agrees = passes(H, residual, variance, beam.agrees < kNoChance ? kReturnGate : kClear)
+                    ? std::min(beam.agrees + 1, kNoChance)
+                    : 0;
   if (beam.agrees < kNoChance) return false;
   update(H, residual, variance);
   return true;
 }
 
-bool GroundTracker::passes(const Vector& H, double residual, double variance) const {
-  return residual * residual < kClear * kClear * (H.dot(P_ * H) + variance);
+bool GroundTracker::passes(const Vector& H, double residual, double variance, double gate) const {
+  return residual * residual < gate * gate * (H.dot(P_ * H) + variance);
 }
 
 void GroundTracker::update(const Vector& H, double residual, double variance) {

@@ -15,7 +15,6 @@
 #include "ear/filter_config.h"
 #include "ear/types.h"
 #include "filter/ingest/beam_ranges.h"
-#include "filter/ingest/repeat_guard.h"
 
 namespace ear {
 
@@ -55,13 +54,14 @@ class GroundTracker {
   using Vector = Eigen::Matrix<double, kSize, 1>;
   using Matrix = Eigen::Matrix<double, kSize, kSize>;
 
-  /// Chosen: a beam that disagreed is used again after so many readings in a row that agree.
+  /// Chosen: readings in a row that are equal, or agree again; noise makes two equal ones a chance of some percent.
   static constexpr int kNoChance = 5;
   struct Beam {
-    RepeatGuard<1> repeats;
-    bool stuck = false;               ///< its last range was the one before again, and that was no chance
-    int agrees = kNoChance;           ///< readings in a row
+    double last = 0.0;                ///< range [m]
+    int same = 0;                     ///< readings in a row with this range
+    int agrees = kNoChance;           ///< readings in a row; a beam that disagreed is used again after some that agree
     std::optional<TimeNs> usable_ns;  ///< when its range last was one
+    [[nodiscard]] bool stuck() const { return same >= kNoChance; }
   };
 
   [[nodiscard]] bool usable(Beam& beam, double range) const;
@@ -69,7 +69,7 @@ class GroundTracker {
   void forget();
   void widen_normal(double variance);
   bool update_with_hit(Beam& beam, const Eigen::Vector3d& d_B, const Eigen::Vector3d& hit_B);
-  [[nodiscard]] bool passes(const Vector& H, double residual, double variance) const;
+  [[nodiscard]] bool passes(const Vector& H, double residual, double variance, double gate) const;
   void update(const Vector& H, double residual, double variance);
 
   LaserCalibration lasers_;
