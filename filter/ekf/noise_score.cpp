@@ -40,6 +40,7 @@ double NoiseScore::add(double residual, const Expected& expected, TimeNs t_ns) {
 
 double NoiseScore::weight() const { return 1.0 / std::sqrt(factor(0.0, 0.0)); }
 
+/// Noise of kClear times the usual is not chance.
 bool NoiseScore::fits() const { return weight() > 1.0 / kClear; }
 
 }  // namespace ear
