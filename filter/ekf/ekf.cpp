@@ -168,13 +168,13 @@ void Ekf::apply(const Eigen::Ref<const Eigen::MatrixXd>& H, int first_column,
 }
 
 /// If the frame was taken a moment later than its stamp, the vehicle moved on: this is how the time offset is seen.
-void Ekf::clone(double feature_noise) {
+void Ekf::clone(double feature_noise, double weight) {
   const ImuState& x = state_.imu;
   const Eigen::Vector3d rate_W = x.R_WB * last_.rate_B;
   Eigen::Matrix<double, 6, 1> J_offset;
   J_offset << rate_W, x.v_W + x.p_WB.cross(rate_W);
   covariance_.append_clone(J_offset);
-  state_.clones.push_back({next_frame_++, x.T_WB(), feature_noise});
+  state_.clones.push_back({next_frame_++, x.T_WB(), feature_noise, weight});
 }
 
 void Ekf::marginalise(std::size_t clone) {

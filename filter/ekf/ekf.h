@@ -78,8 +78,8 @@ class Ekf {
   Eigen::Ref<const Eigen::VectorXd> correction(const Eigen::Ref<const Eigen::MatrixXd>& H, int first_column,
                                                const Eigen::Ref<const Eigen::VectorXd>& r, CameraUpdate calibration);
 
-  /// The body's pose now joins the window. `feature_noise`: of what was seen from it, times the usual.
-  void clone(double feature_noise);
+  /// The body's pose now joins the window. What was seen from it has `feature_noise`, times the usual, and `weight`.
+  void clone(double feature_noise, double weight = 1.0);
   void marginalise(std::size_t clone);
 
   /// The origin of the world is where the body is now, by definition.

@@ -132,6 +132,7 @@ struct Clone {
   std::uint64_t frame = 0;  ///< number of the frame, never used again
   Pose T_WB;
   double feature_noise = 1.0;  ///< standard deviation of what was seen from it, times the usual
+  double weight = 1.0;         ///< (15) of what was seen from it: the noise of a feature that fits is divided by it
 };
 
 struct State {

@@ -42,7 +42,7 @@ void ImuClock::follow(TimeNs driver_ns) {
   if (last_ns_) {
     const double step = seconds_between(*last_ns_, driver_ns);
     if (interval_ == 0.0 && step > 0.0) interval_ = std::min(step, kClockJump);
-    if (std::abs(step - interval_) <= kClockJump) interval_ += interval_ / kClockMemory * (step - interval_);
+    if (std::abs(step - interval_) <= kClockJump) interval_ += interval_ / kStreamMemory * (step - interval_);
   }
   last_ns_ = driver_ns;
   for (Other& other : others_) {
@@ -116,8 +116,8 @@ void ImuClock::settle(bool own_clock) {
 void ImuClock::review(Other& other, TimeNs stamp_ns) {
   const double ahead = seconds_between(*last_ns_ - shift_ns_, stamp_ns);
   if (!uncertain_) {
-    const double passed = other.newest_ns ? seconds_between(*other.newest_ns, stamp_ns) : kClockMemory;
-    other.ahead += std::clamp(passed / kClockMemory, 0.0, 1.0) * (ahead - other.ahead);
+    const double passed = other.newest_ns ? seconds_between(*other.newest_ns, stamp_ns) : kStreamMemory;
+    other.ahead += std::clamp(passed / kStreamMemory, 0.0, 1.0) * (ahead - other.ahead);
     return;
   }
   const double jumped = (ahead - other.ahead) / uncertain_->jump;

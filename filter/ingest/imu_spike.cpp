@@ -49,7 +49,7 @@ bool SpikeWatch::add(ImuBuffer& samples, double dt, int lost, bool clips) {
 
   if (!jumps) {
     count(step, dt);
-    if (last_change_) shared_ += (1.0 - std::exp(-dt / kNoiseMemory)) * (change.dot(*last_change_) - shared_);
+    if (last_change_) shared_ += (1.0 - std::exp(-dt / kStreamMemory)) * (change.dot(*last_change_) - shared_);
   }
   last_change_ = jumps ? std::nullopt : std::optional(change);
   const bool begins = jumps && samples.entry(1).noise.*factor_ == 1.0;

@@ -37,8 +37,9 @@ inline constexpr double kSlopeMemory = 100.0;
 /// Chosen: of the path, two standard deviations of the position while tracking; a fit has settled when it moves by no
 /// more, in standard deviations.
 inline constexpr double kPrecise = 0.05;
-/// [s] chosen: of the noise of inertial samples: a single image that is wrong changes little.
-inline constexpr double kNoiseMemory = 2.0;
+/// [s] chosen: of what a stream is usually like: its noise, its interval, how far it is ahead of another. One image
+/// that is wrong, or one reading that is late, changes little.
+inline constexpr double kStreamMemory = 2.0;
 /// Chosen: of a variance, times the usual or stated one: noise that is learned is ten times that at most.
 inline constexpr double kFarthest = 100.0;
 /// Chosen: times the usual or stated noise; less may be chance.

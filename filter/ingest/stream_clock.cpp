@@ -22,7 +22,7 @@ double StreamClock::jump_at(TimeNs t_ns, TimeNs now_ns, double tick) const {
 void StreamClock::follow(TimeNs t_ns, std::optional<TimeNs> now_ns) {
   if (now_ns && last_ns_ && last_now_ns_) {
     const double step = seconds_between(*last_ns_, t_ns);
-    const double share = std::max(std::min(interval_ / kClockMemory, 1.0), 1.0 / (count_ + 1));
+    const double share = std::max(std::min(interval_ / kStreamMemory, 1.0), 1.0 / (count_ + 1));
     if (step > 0.0 && (count_ < kToKnow || std::abs(step - interval_) < kClockJump))
       interval_ += share * (step - interval_);
     ahead_ += share * (seconds_between(*now_ns, t_ns) - ahead_);

@@ -12,8 +12,7 @@
 
 namespace ear {
 
-inline constexpr double kClockJump = 0.04;   ///< [s] chosen: either way; less may be a driver that was held up
-inline constexpr double kClockMemory = 2.0;  ///< [s] chosen: of how readings usually come
+inline constexpr double kClockJump = 0.04;  ///< [s] chosen: either way; less may be a driver that was held up
 /// Chosen: readings in a row, to put back what was taken out: so many do not all have false stamps, whatever their
 /// rate.
 inline constexpr int kContradictions = 8;

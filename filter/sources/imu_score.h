@@ -58,7 +58,7 @@ class ImuScore {
   ImuNoiseFactors at_rest_;  ///< on the stated noise, when it last stood or started
   double unseen_accel_ = 1.0;
   Excess excess_;
-  NoiseScore gyro_{kNoiseMemory, kFarthest}, accel_{kNoiseMemory, kFarthest};
+  NoiseScore gyro_{kStreamMemory, kFarthest}, accel_{kStreamMemory, kFarthest};
 };
 
 }  // namespace ear

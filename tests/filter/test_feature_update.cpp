@@ -292,6 +292,28 @@ TEST_CASE("feature: the gate is the chi-square of the projected innovation") {
   }
 }
 
+TEST_CASE("feature: a camera in doubt counts as little as its weight says, and is gated by the noise of its images") {
+  std::mt19937_64 rng{67};
+  const Gate gate(0.98, 20);
+  Scene scene = random_scene(rng, 4);
+  const Eigen::MatrixXd known = Eigen::MatrixXd::Zero(scene.x.error_size(), scene.x.error_size());
+  FeatureInformation information(4, 4);
+  const auto information_of = [&](const Scene& seen) {
+    information.start(seen.x.error_size());
+    REQUIRE(information.add(seen.observations, kSigma, 1e9, known, gate));
+    information.compress();
+    return Eigen::MatrixXd(information.H().transpose() * information.H());
+  };
+  const Eigen::MatrixXd trusted = information_of(scene);
+  for (LinearizedObservation& z : scene.observations) z.weight = 0.1;
+  CHECK((information_of(scene) - 0.01 * trusted).norm() < 1e-6 * trusted.norm());
+
+  Scene moved = random_scene(rng, 4, 20.0 * kSigma);  // by its weight that is two standard deviations
+  for (LinearizedObservation& z : moved.observations) z.weight = 0.1;
+  information.start(moved.x.error_size());
+  CHECK_FALSE(information.add(moved.observations, kSigma, 1e9, known, gate));
+}
+
 TEST_CASE("feature: a common turn about gravity and a common shift cannot be seen") {
   std::mt19937_64 rng{65};
   const Scene scene = random_scene(rng, 4);

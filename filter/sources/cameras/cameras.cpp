@@ -151,7 +151,7 @@ FrameAgreement Cameras::compare(const FeatureFrame& frame, const Ekf& ekf) {
 }
 
 void Cameras::update(const FeatureFrame& frame, double weight, CameraUpdate calibration, Ekf& ekf, Records& records) {
-  ekf.clone(frame_check_.noise() / weight);
+  ekf.clone(frame_check_.noise(), weight);
   tracks_.add(ekf.state().clones.back().frame, frame.features);
   const std::optional<std::size_t> next = window_.to_marginalise(ekf.state(), tracks_);
   const UsedTracks ordinary = next && *next == 0 ? UsedTracks::oldest_too : UsedTracks::ended;
@@ -163,7 +163,7 @@ void Cameras::update(const FeatureFrame& frame, double weight, CameraUpdate cali
 }
 
 void Cameras::clone_without_image(double weight, Ekf& ekf) {
-  ekf.clone(frame_check_.noise() / weight);
+  ekf.clone(frame_check_.noise(), weight);
   marginalise(window_.to_marginalise(ekf.state(), tracks_), ekf);
 }
 

@@ -1,6 +1,7 @@
 #include "filter/sources/cameras/feature_update.h"
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <cassert>
 #include <cmath>
 #include <limits>
@@ -50,6 +51,7 @@ LinearizedObservation linearize_observation(const State& x, int clone, int camer
   LinearizedObservation z = linearize_observation(seen_from.T_WB, x.camera, camera, point, uv);
   z.clone = clone;
   z.noise = seen_from.feature_noise;
+  z.weight = seen_from.weight;
   return z;
 }
 
@@ -117,12 +119,32 @@ void FeatureInformation::start(int error_size) {
   b_.head(size_).setZero();
 }
 
+/// A feature in doubt, of a camera that weighs little, has to fit by the noise of its image all the same: what moves in
+/// view moves alike in many features, and does not average out.
 bool FeatureInformation::add(const std::vector<LinearizedObservation>& observations, double sigma, double huber,
                              const Eigen::Ref<const Eigen::MatrixXd>& P, const Gate& gate) {
   const int dof = 2 * static_cast<int>(observations.size()) - 3;
   if (dof <= 0 || 3 * (features_ + 1) > W_.cols()) return false;
+  std::optional<Projected> own = project(observations, sigma, huber, false);
+  if (!own) return false;
+  // With P = 0 the statistic is largest: who passes then passes anyway, and the full test is not needed.
+  if (!gate.fits(own->residual_cost, 1.0, dof) && !gate.fits(chi_squared(observations, *own, P), 1.0, dof)) {
+    return false;
+  }
+  const auto in_doubt = [](const LinearizedObservation& z) { return z.weight < 1.0; };
+  if (std::any_of(observations.begin(), observations.end(), in_doubt)) {
+    own = project(observations, sigma, huber, true);
+    if (!own) return false;
+  }
+  sum_up(observations, own->Lv, A_, b_);
+  ++features_;
+  return true;
+}
 
-  // The feature's own block first: it alone decides, most of the time, about the gate.
+/// The feature's own block, which alone decides, most of the time, about the gate; the next of W_ becomes its share of
+/// the columns.
+std::optional<FeatureInformation::Projected> FeatureInformation::project(
+    const std::vector<LinearizedObservation>& observations, double sigma, double huber, bool by_score) {
   Eigen::Matrix3d V = Eigen::Matrix3d::Zero();
   Eigen::Vector3d v = Eigen::Vector3d::Zero();
   double cost = 0.0;
@@ -130,7 +152,8 @@ bool FeatureInformation::add(const std::vector<LinearizedObservation>& observati
   for (const LinearizedObservation& z : observations) {
     const double sigma_z = sigma * z.noise;
     const double distance = z.residual.norm() / sigma_z;
-    const double w = (distance > huber ? huber / distance : 1.0) / (sigma_z * sigma_z);  // Huber's, and whitening
+    const double score = by_score ? z.weight : 1.0;
+    const double w = (distance > huber ? huber / distance : 1.0) * score * score / (sigma_z * sigma_z);
     weights_.push_back(w);
     V.noalias() += w * z.H_f.transpose() * z.H_f;
     v.noalias() += w * z.H_f.transpose() * z.residual;
@@ -138,7 +161,7 @@ bool FeatureInformation::add(const std::vector<LinearizedObservation>& observati
   }
   V.diagonal().array() += 1e-13 * V.trace();  // a point at infinity has no depth to project out
   const Eigen::LLT<Eigen::Matrix3d> V_llt(V);
-  if (V_llt.info() != Eigen::Success || !std::isfinite(cost)) return false;
+  if (V_llt.info() != Eigen::Success || !std::isfinite(cost)) return std::nullopt;
   const Eigen::Vector3d Lv = V_llt.matrixL().solve(v);
 
   auto W = W_.block(0, 3 * features_, size_, 3);
@@ -152,14 +175,7 @@ bool FeatureInformation::add(const std::vector<LinearizedObservation>& observati
   }
   kernels_.solve({V_llt.matrixLLT().data(), 3}, size_, 3, {W.data(), W.outerStride()});
 
-  // With P = 0 the statistic is largest: who passes then passes anyway, and the full test is not needed.
-  const double residual_cost = cost - Lv.squaredNorm();
-  if (!gate.fits(residual_cost, 1.0, dof) && !gate.fits(chi_squared(observations, Lv, P, residual_cost), 1.0, dof)) {
-    return false;
-  }
-  sum_up(observations, Lv, A_, b_);
-  ++features_;
-  return true;
+  return Projected{Lv, cost - Lv.squaredNorm()};
 }
 
 /// Adds the feature at hand, the last in W_, to A and b: its own block is not yet projected out of A, but out of b.
@@ -186,14 +202,13 @@ void FeatureInformation::sum_up(const std::vector<LinearizedObservation>& observ
   b.head(size_).noalias() -= W_.block(0, 3 * features_, size_, 3) * Lv;
 }
 
-/// r^T (H P H^T + I)^-1 r over all rows of the feature at hand, the last in W_. `residual_cost`: r^T r. What the
-/// projected rows do not show of r is noise alone.
-double FeatureInformation::chi_squared(const std::vector<LinearizedObservation>& observations,
-                                       const Eigen::Vector3d& Lv, const Eigen::Ref<const Eigen::MatrixXd>& P,
-                                       double residual_cost) {
+/// r^T (H P H^T + I)^-1 r over all rows of the feature at hand, the last in W_. What the projected rows do not show of
+/// r is noise alone.
+double FeatureInformation::chi_squared(const std::vector<LinearizedObservation>& observations, const Projected& own,
+                                       const Eigen::Ref<const Eigen::MatrixXd>& P) {
   gate_A_.topLeftCorner(rounded_up(size_), rounded_up(size_)).setZero();
   gate_b_.head(size_).setZero();
-  sum_up(observations, Lv, gate_A_, gate_b_);
+  sum_up(observations, own.Lv, gate_A_, gate_b_);
   scale_.head(size_) = gate_A_.diagonal().head(size_);
   kernels_.subtract_square({W_.col(3 * features_).data(), W_.outerStride()}, 3, size_, writable(gate_A_));
   rows_from_sums(kernels_, gate_A_, size_, gate_b_, pivots_, scale_, kRounding, gate_rows_);
@@ -205,7 +220,7 @@ double FeatureInformation::chi_squared(const std::vector<LinearizedObservation>&
   for (int k = 0; k < rows; ++k) gate_PHt_.col(k).head(size_).noalias() = P_camera * Ht.col(k).head(size_);
   kernels_.multiply_transposed(readable(Ht), readable(gate_PHt_), rounded_up(size_), rows, writable(gate_A_));
   gate_A_.diagonal().head(rows).array() += 1.0;  // of H P H^T: the sum is read no more
-  const double noise_cost = residual_cost - r.squaredNorm();
+  const double noise_cost = own.residual_cost - r.squaredNorm();
   if (!kernels_.factorize(writable(gate_A_), rows, r.data())) return std::numeric_limits<double>::infinity();
   return noise_cost + r.squaredNorm();
 }

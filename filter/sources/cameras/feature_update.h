@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <vector>
 
 #include "filter/ekf/gate.h"
@@ -30,6 +31,7 @@ struct LinearizedObservation {
   Eigen::Matrix<double, 2, err::clone_size> H_clone;
   Eigen::Matrix<double, 2, 3> H_f;  ///< feature times its inverse depth, world axes
   double noise = 1.0;               ///< its standard deviation, times that of all observations
+  double weight = 1.0;              ///< (15): the noise is divided by it once the feature fits
 };
 
 /// Poses of both cameras for every clone: index 2 * clone + camera.
@@ -62,7 +64,8 @@ class FeatureInformation {
   void start(int error_size);
 
   /// Adds a feature. `sigma`: one observation, normalized; `huber`: the distance in sigmas from which observations
-  /// weigh less. `P`: the covariance. Returns false, and adds nothing, if the feature fails the gate.
+  /// weigh less. `P`: the covariance. Returns false, and adds nothing, if the feature fails the gate, in which the
+  /// observations' `weight` does not count.
   bool add(const std::vector<LinearizedObservation>& observations, double sigma, double huber,
            const Eigen::Ref<const Eigen::MatrixXd>& P, const Gate& gate);
 
@@ -78,8 +81,14 @@ class FeatureInformation {
   [[nodiscard]] Eigen::Ref<const Eigen::VectorXd> residual() const { return rows_.r.head(rows_.count); }
 
  private:
-  [[nodiscard]] double chi_squared(const std::vector<LinearizedObservation>& observations, const Eigen::Vector3d& Lv,
-                                   const Eigen::Ref<const Eigen::MatrixXd>& P, double residual_cost);
+  struct Projected {
+    Eigen::Vector3d Lv;          // L^-1 H_f^T r of V = H_f^T H_f = L L^T, whitened
+    double residual_cost = 0.0;  // r^T r of the rows, the feature projected out
+  };
+  std::optional<Projected> project(const std::vector<LinearizedObservation>& observations, double sigma, double huber,
+                                   bool by_score);
+  [[nodiscard]] double chi_squared(const std::vector<LinearizedObservation>& observations, const Projected& own,
+                                   const Eigen::Ref<const Eigen::MatrixXd>& P);
   void sum_up(const std::vector<LinearizedObservation>& observations, const Eigen::Vector3d& Lv, Eigen::MatrixXd& A,
               Eigen::VectorXd& b) const;
 
@@ -90,7 +99,7 @@ class FeatureInformation {
   Eigen::MatrixXd H_;      // of these rows
   Eigen::MatrixXd A_, W_;  // with rows beyond for the kernels; W_: H^T H_f V^-1/2 of each feature, 3 columns each
   Eigen::VectorXd b_, scale_, pivots_;
-  std::vector<double> weights_;  // of its observations: Huber's, over the variance
+  std::vector<double> weights_;  // of its observations: Huber's, times the score's, over the variance
   WhitenedRows gate_rows_;
   Eigen::MatrixXd gate_A_, gate_PHt_;
   Eigen::VectorXd gate_b_;

@@ -211,7 +211,7 @@ void TrackUpdate::log(const Ekf& ekf, Records& records) const {
     typical.value = std::sqrt(seen.squares_px2 / seen.count);
     typical.variance = config_.feature_sigma_px * config_.feature_sigma_px;
     typical.gate = ekf.gate().quantile(1);
-    typical.score = 1.0 / ekf.state().clones.back().feature_noise;
+    typical.score = ekf.state().clones.back().weight / ekf.state().clones.back().feature_noise;
     records.log.add(camera == 0 ? Source::camera_left : Source::camera_right, typical, records.statistics.features_used,
                     records.statistics.features_rejected, ekf.state().imu.t_ns);
   }

@@ -21,7 +21,7 @@ class ReadingNoise {
     if (increment.from_ns != last_ns_ || std::max(dt, dt_) > longest_silence(std::min(dt, dt_))) steps_ = -1;
     last_ns_ = increment.to_ns;
     const double step = 0.5 * (dt + dt_) * (speed - speed_);
-    if (steps_ > 0) shared_ += std::min(1.0, dt / kNoiseMemory) * (step * step_ - shared_);
+    if (steps_ > 0) shared_ += std::min(1.0, dt / kStreamMemory) * (step * step_ - shared_);
     steps_ = std::min(steps_ + 1, 1);
     step_ = step;
     speed_ = speed;
