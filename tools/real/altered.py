@@ -307,6 +307,7 @@ ALTERATIONS = [
     Alteration("wheels_stamps", "stamps of the wheels scatter by 5 ms", on([WHEELS], scattered_readings), (WHEELS,)),
     Alteration("wheels_late", "stamps of the wheels 50 ms late", on([WHEELS], later(0.05)), (WHEELS,)),
     Alteration("beams_exchanged", "first and last beam exchanged", on([BEAMS], exchanged(1, 3)), (BEAMS,)),
+    Alteration("beams_coarse", "beams that read in steps of 1 cm", on([BEAMS], each_value((1, 2, 3), lambda x, _: round(x, 2))), (BEAMS,)),
     Alteration("begins_late", "without the first third: it starts in motion", begin_late),
 ]
 

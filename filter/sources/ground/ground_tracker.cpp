@@ -78,16 +78,15 @@ int GroundTracker::update(const LaserSample& sample) {
   return agreeing;
 }
 
-/// A return that is not always the same: noise makes each reading of a working beam another one.
+/// A return that is not always the same.
 bool GroundTracker::usable(Beam& beam, double range) const {
-  beam.same = range == beam.last ? beam.same + 1 : 1;
-  beam.last = range;
-  return !beam.stuck() && is_return(range, lasers_);
+  beam.repeats.add(range);
+  return !beam.repeats.stuck() && is_return(range, lasers_);
 }
 
 std::bitset<kMaxBeams> GroundTracker::stuck_beams() const {
   std::bitset<kMaxBeams> stuck;
-  for (std::size_t i = 0; i < beams_.size(); ++i) stuck[i] = beams_[i].stuck();
+  for (std::size_t i = 0; i < beams_.size(); ++i) stuck[i] = beams_[i].repeats.stuck();
   return stuck;
 }
 

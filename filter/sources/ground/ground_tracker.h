@@ -15,6 +15,7 @@
 #include "ear/filter_config.h"
 #include "ear/types.h"
 #include "filter/ingest/beam_ranges.h"
+#include "filter/sources/ground/beam_repeats.h"
 
 namespace ear {
 
@@ -54,14 +55,10 @@ class GroundTracker {
   using Vector = Eigen::Matrix<double, kSize, 1>;
   using Matrix = Eigen::Matrix<double, kSize, kSize>;
 
-  /// Chosen: readings in a row that are equal, or agree again; noise makes two equal ones a chance of some percent.
-  static constexpr int kNoChance = 5;
   struct Beam {
-    double last = 0.0;                ///< range [m]
-    int same = 0;                     ///< readings in a row with this range
+    BeamRepeats repeats;
     int agrees = kNoChance;           ///< readings in a row; a beam that disagreed is used again after some that agree
     std::optional<TimeNs> usable_ns;  ///< when its range last was one
-    [[nodiscard]] bool stuck() const { return same >= kNoChance; }
   };
 
   [[nodiscard]] bool usable(Beam& beam, double range) const;
