@@ -33,13 +33,15 @@ double drive_and_flight(int reading) {
   return 0.2037 + 0.5 * (1.0 - std::cos(M_PI * (t - 40.0) / 10.0));
 }
 
-/// How many of an hour's readings are called stuck.
-int called_stuck(double step, double sigma) {
+/// How many of an hour's readings are called stuck, each range being given so often.
+int called_stuck(double step, double sigma, int times = 1) {
   RangeFinder finder(step);
   BeamRepeats repeats;
   int stuck = 0;
+  double range = 0.0;
   for (int i = 0; i < 180'000; ++i) {
-    repeats.add(finder.read(drive_and_flight(i), sigma));
+    if (i % times == 0) range = finder.read(drive_and_flight(i), sigma);
+    repeats.add(range);
     stuck += repeats.stuck() ? 1 : 0;
   }
   return stuck;
@@ -66,6 +68,14 @@ TEST_CASE("beam repeats: a sound beam is never stuck, whatever its steps and its
       CAPTURE(sigma);
       CHECK(called_stuck(step, sigma) == 0);
     }
+  }
+}
+
+TEST_CASE("beam repeats: a beam that is asked more often than it measures is not stuck") {
+  for (const int times : {2, 4, 5, 10}) {
+    CAPTURE(times);
+    CHECK(called_stuck(0.0, 0.004, times) == 0);
+    CHECK(called_stuck(0.001, 0.004, times) == 0);
   }
 }
 

@@ -1,6 +1,6 @@
 // Does a beam give the same range again and again? Noise makes each reading of a working one another, unless it reads
-// in steps that are larger than its noise: how often its range changes by the smallest step shows it. docs/filter.md,
-// "Beams that repeat".
+// in steps that are larger than its noise, or less often than it is asked: its changes show it. docs/filter.md, "Beams
+// that repeat".
 #pragma once
 
 #include <algorithm>
@@ -16,31 +16,41 @@ inline constexpr int kNoChance = 5;
 
 class BeamRepeats {
  public:
-  /// Returns in time order [m].
+  /// Readings in time order [m].
   void add(double range) {
     const double step = std::abs(range - last_);
     last_ = range;
     same_ = step == 0.0 ? same_ + 1 : 1;
+    if (same_ <= kNoChance) again_.add(step == 0.0);  // however long a beam is stuck, it is not usual
     if (!(step > 0.0)) return;
-    if (step < smallest_ * (1.0 - kAlike)) single_ = 0.0;  // what was counted were several of these
+    if (step < smallest_ * (1.0 - kAlike)) single_.share = 0.0;  // what was counted were several of these
     smallest_ = std::min(smallest_, step);
-    changes_ = std::min<double>(changes_ + 1.0, kCapacity);
-    single_ += ((step < smallest_ * (1.0 + kAlike) ? 1.0 : 0.0) - single_) / changes_;
+    single_.add(step < smallest_ * (1.0 + kAlike));
   }
 
   /// Equal readings in a row that are no chance. Of normal noise in steps, readings repeat less often than their
   /// changes are single steps.
   [[nodiscard]] bool stuck() const {
-    const bool coarse = changes_ < kToKnow || single_ > kAlike;
-    return same_ >= kNoChance && !coarse && std::pow(single_, same_ - 1) < std::exp(-kClear * kClear);
+    const bool coarse = single_.count < kToKnow || single_.share > kAlike;
+    const double chance = std::max(single_.share, again_.share);
+    return same_ >= kNoChance && !coarse && std::pow(chance, same_ - 1) < std::exp(-kClear * kClear);
   }
 
  private:
+  struct Share {
+    double share = 0.0, count = 0.0;
+
+    void add(bool is) {
+      count = std::min<double>(count + 1.0, kCapacity);
+      share += ((is ? 1.0 : 0.0) - share) / count;
+    }
+  };
+
   double last_ = 0.0;
   int same_ = 0;                                               // readings in a row with this range
-  double smallest_ = std::numeric_limits<double>::infinity();  // [m] of its changes
-  double changes_ = 0.0;
-  double single_ = 0.0;  // share of the changes that are the smallest, in the mean
+  double smallest_ = std::numeric_limits<double>::infinity();  // of its changes [m]
+  Share single_;                                               // of the changes that are the smallest
+  Share again_;                                                // of the readings that repeat
 };
 
 }  // namespace ear
