@@ -121,7 +121,8 @@ void CommonEstimator::add_laser(const LaserSample& given) {
     health_.add_laser(sample, verdict, *calibration_.lasers, sources_.ground().stuck_beams(), newest_ns);
   }
   if (verdict != Verdict::accepted) return;
-  if (const auto due_ns = ingest_.push(BeamRanges(sample, *calibration_.lasers), ekf_.running())) make_room(*due_ns);
+  const BeamRanges ranges(sample, *calibration_.lasers, sources_.ground().repeating_beams());
+  if (const auto due_ns = ingest_.push(ranges, ekf_.running())) make_room(*due_ns);
 }
 
 std::optional<TimeNs> CommonEstimator::common_stamp(TimeNs camera_stamp_ns) {

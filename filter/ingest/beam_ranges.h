@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bitset>
 #include <limits>
 
 #include "ear/calibration.h"
@@ -18,12 +19,14 @@ inline constexpr int kMaxBeams = 3;
   return range >= lasers.range_min && range <= lasers.range_max;
 }
 
-/// Ranges of one reading of the lasers [m]; NaN without return, and out of their limits.
+/// Ranges of one reading of the lasers [m]; NaN without a new return, and out of their limits.
 struct BeamRanges {
   BeamRanges() = default;
-  BeamRanges(const LaserSample& sample, const LaserCalibration& lasers) : t_ns(sample.t_ns) {
+  BeamRanges(const LaserSample& sample, const LaserCalibration& lasers, const std::bitset<kMaxBeams>& repeating = {})
+      : t_ns(sample.t_ns) {
     for (std::size_t i = 0; i < std::min(sample.range.size(), range.size()); ++i) {
-      range[i] = is_return(sample.range[i], lasers) ? sample.range[i] : std::numeric_limits<double>::quiet_NaN();
+      const bool is_new = is_return(sample.range[i], lasers) && !repeating[i];
+      range[i] = is_new ? sample.range[i] : std::numeric_limits<double>::quiet_NaN();
     }
   }
 

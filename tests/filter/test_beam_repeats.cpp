@@ -3,6 +3,7 @@
 #include <cmath>
 #include <random>
 
+#include "filter/ingest/beam_ranges.h"
 #include "filter/sources/ground/beam_repeats.h"
 
 using namespace ear;
@@ -101,4 +102,25 @@ TEST_CASE("beam repeats: one that never changed may be of coarse steps") {
   BeamRepeats repeats;
   for (int i = 0; i < 1000; ++i) repeats.add(0.2);
   CHECK_FALSE(repeats.stuck());
+}
+
+TEST_CASE("beam repeats: what a beam gives again is no new reading, unless it reads in coarse steps") {
+  RangeFinder fine(0.0), coarse(0.01);
+  BeamRepeats of_fine, of_coarse;
+  int repeats = 0;
+  for (int i = 0; i < 1500; ++i) {
+    of_fine.add(fine.read(drive_and_flight(i), 0.004));
+    of_coarse.add(coarse.read(drive_and_flight(i), 0.004));
+    repeats += of_fine.repeats() || of_coarse.repeats() ? 1 : 0;
+  }
+  CHECK(repeats == 0);
+  of_fine.add(0.2);
+  of_fine.add(0.2);
+  CHECK(of_fine.repeats());
+  CHECK_FALSE(of_fine.stuck());
+
+  const BeamRanges reading(LaserSample{7, {0.2, 0.3, 0.4}}, LaserCalibration{}, std::bitset<kMaxBeams>("010"));
+  CHECK(reading.range[0] == 0.2);
+  CHECK(std::isnan(reading.range[1]));
+  CHECK(reading.range[2] == 0.4);
 }

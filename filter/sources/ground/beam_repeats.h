@@ -28,12 +28,14 @@ class BeamRepeats {
     single_.add(step < smallest_ * (1.0 + kAlike));
   }
 
-  /// Equal readings in a row that are no chance. Of normal noise in steps, readings repeat less often than their
-  /// changes are single steps.
+  /// Is the last reading no new one? A beam that reads in coarse steps may measure the same again.
+  [[nodiscard]] bool repeats() const { return same_ > 1 && single_.count >= kToKnow && single_.share <= kAlike; }
+
+  /// So often in a row that it is no chance. Of normal noise in steps, readings repeat less often than their changes
+  /// are single steps.
   [[nodiscard]] bool stuck() const {
-    const bool coarse = single_.count < kToKnow || single_.share > kAlike;
     const double chance = std::max(single_.share, again_.share);
-    return same_ >= kNoChance && !coarse && std::pow(chance, same_ - 1) < std::exp(-kClear * kClear);
+    return repeats() && same_ >= kNoChance && std::pow(chance, same_ - 1) < std::exp(-kClear * kClear);
   }
 
  private:

@@ -44,7 +44,10 @@ class ContactDetector {
   [[nodiscard]] ContactMode mode() const { return mode_; }
   /// When the wheels last left the ground or met it; nothing if that was not seen.
   [[nodiscard]] std::optional<TimeNs> since_ns() const { return since_ns_; }
-  /// Beams that give the same range again and again.
+  /// Beams whose last reading is no new one, and those that give the same range again and again.
+  [[nodiscard]] std::bitset<kMaxBeams> repeating_beams() const {
+    return ground_ ? ground_->repeating_beams() : std::bitset<kMaxBeams>{};
+  }
   [[nodiscard]] std::bitset<kMaxBeams> stuck_beams() const {
     return ground_ ? ground_->stuck_beams() : std::bitset<kMaxBeams>{};
   }

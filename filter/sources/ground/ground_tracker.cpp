@@ -84,10 +84,10 @@ bool GroundTracker::usable(Beam& beam, double range) const {
   return !beam.repeats.stuck() && is_return(range, lasers_);
 }
 
-std::bitset<kMaxBeams> GroundTracker::stuck_beams() const {
-  std::bitset<kMaxBeams> stuck;
-  for (std::size_t i = 0; i < beams_.size(); ++i) stuck[i] = beams_[i].repeats.stuck();
-  return stuck;
+std::bitset<kMaxBeams> GroundTracker::beams_that(bool (BeamRepeats::*property)() const) const {
+  std::bitset<kMaxBeams> which;
+  for (std::size_t i = 0; i < beams_.size(); ++i) which[i] = (beams_[i].repeats.*property)();
+  return which;
 }
 
 int GroundTracker::beams_that_see() const {
