@@ -28,17 +28,20 @@ class BeamRepeats {
     single_.add(step < smallest_ * (1.0 + kAlike));
   }
 
-  /// Is the last reading no new one? A beam that reads in coarse steps may measure the same again.
-  [[nodiscard]] bool repeats() const { return same_ > 1 && single_.count >= kToKnow && single_.share <= kAlike; }
+  /// Is the last reading no new one? Of normal noise in steps, readings repeat less often than their changes are single
+  /// steps: where they repeat more often, it is not by chance.
+  [[nodiscard]] bool repeats() const { return same_ > 1 && reads_finely() && again_.share > single_.share; }
 
-  /// So often in a row that it is no chance. Of normal noise in steps, readings repeat less often than their changes
-  /// are single steps.
+  /// Equal readings in a row that are no chance, nor usual.
   [[nodiscard]] bool stuck() const {
     const double chance = std::max(single_.share, again_.share);
-    return repeats() && same_ >= kNoChance && std::pow(chance, same_ - 1) < std::exp(-kClear * kClear);
+    return same_ >= kNoChance && reads_finely() && std::pow(chance, same_ - 1) < std::exp(-kClear * kClear);
   }
 
  private:
+  /// A beam that reads in coarse steps may measure the same again.
+  [[nodiscard]] bool reads_finely() const { return single_.count >= kToKnow && single_.share <= kAlike; }
+
   struct Share {
     double share = 0.0, count = 0.0;
 
