@@ -118,10 +118,11 @@ void CommonEstimator::add_laser(const LaserSample& given) {
   if (verdict == Verdict::accepted) note(sources_.watch_contact(sample, ekf_));
   if (!ingest_.imu().empty()) {
     const TimeNs newest_ns = ingest_.imu().newest().t_ns;
-    health_.add_laser(sample, verdict, *calibration_.lasers, sources_.ground().stuck_beams(), newest_ns);
+    const std::bitset<kMaxBeams> stuck = sources_.ground().beams_that(&BeamRepeats::stuck);
+    health_.add_laser(sample, verdict, *calibration_.lasers, stuck, newest_ns);
   }
   if (verdict != Verdict::accepted) return;
-  const BeamRanges ranges(sample, *calibration_.lasers, sources_.ground().repeating_beams());
+  const BeamRanges ranges(sample, *calibration_.lasers, sources_.ground().beams_that(&BeamRepeats::repeats));
   if (const auto due_ns = ingest_.push(ranges, ekf_.running())) make_room(*due_ns);
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 
 namespace ear {
@@ -54,6 +55,11 @@ inline constexpr int kToKnow = 20;  ///< chosen: a mean of so many is known, wha
 inline constexpr int kConfirmed = 3;
 /// Chosen: fewer features show too little of where the vehicle is, or of how it moved.
 inline constexpr int kFewFeatures = 10;
+/// Are so many repeats in a row no chance, where this share of the readings repeats? As little as kClear standard
+/// deviations of two sensors.
+[[nodiscard]] inline bool is_no_chance(double share, int repeats) {
+  return std::pow(share, repeats) < std::exp(-kClear * kClear);
+}
 /// Does the gate refuse most of so many features? That of a state that is right refuses hardly any.
 [[nodiscard]] inline bool refuses_most(double used, double rejected) {
   return rejected > used && used + rejected >= kFewFeatures;

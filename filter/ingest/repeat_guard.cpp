@@ -1,7 +1,6 @@
 #include "filter/ingest/repeat_guard.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "filter/ingest/limits.h"
 
@@ -19,8 +18,7 @@ void RepeatGuard::learn(const Values& step) {
 /// Is there noise in any axis? Where there is none, as in a simulation, samples repeat at rest.
 bool RepeatGuard::noisy() const { return rough_.maxCoeff() > kAlike; }
 
-/// What a run says of all this counts after it. No chance is what is that of kClear standard deviations in both
-/// sensors.
+/// What a run says of all this counts after it.
 bool RepeatGuard::repeats(const ImuSample& sample) {
   Values values;
   values << sample.gyro_B, sample.accel_B;
@@ -30,7 +28,7 @@ bool RepeatGuard::repeats(const ImuSample& sample) {
   }
   if (values == *last_) {
     run_ = std::min(run_ + 1, static_cast<int>(kCapacity));
-    return noisy() && std::pow(share_, run_) < std::exp(-kClear * kClear);
+    return noisy() && is_no_chance(share_, run_);
   }
   for (; run_ > 0; --run_) learn(Values::Zero());
   learn(values - *last_);

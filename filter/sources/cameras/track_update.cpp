@@ -204,6 +204,7 @@ void TrackUpdate::add_to_pattern(const Track& track, const CameraState& cameras)
 
 /// What both cameras saw of this frame's features, against where they were found to be.
 void TrackUpdate::log(const Ekf& ekf, Records& records) const {
+  const Clone& newest = ekf.state().clones.back();
   for (std::size_t camera = 0; camera < residuals_.size(); ++camera) {
     const Residuals& seen = residuals_[camera];
     if (seen.count == 0) continue;
@@ -211,7 +212,7 @@ void TrackUpdate::log(const Ekf& ekf, Records& records) const {
     typical.value = std::sqrt(seen.squares_px2 / seen.count);
     typical.variance = config_.feature_sigma_px * config_.feature_sigma_px;
     typical.gate = ekf.gate().quantile(1);
-    typical.score = ekf.state().clones.back().weight / ekf.state().clones.back().feature_noise;
+    typical.score = newest.weight / newest.feature_noise;
     records.log.add(camera == 0 ? Source::camera_left : Source::camera_right, typical, records.statistics.features_used,
                     records.statistics.features_rejected, ekf.state().imu.t_ns);
   }

@@ -16,6 +16,8 @@ inline constexpr int kNoChance = 5;
 
 class BeamRepeats {
  public:
+  using Property = bool (BeamRepeats::*)() const;
+
   /// Readings in time order [m].
   void add(double range) {
     const double step = std::abs(range - last_);
@@ -34,8 +36,7 @@ class BeamRepeats {
 
   /// Equal readings in a row that are no chance, nor usual.
   [[nodiscard]] bool stuck() const {
-    const double chance = std::max(single_.share, again_.share);
-    return same_ >= kNoChance && reads_finely() && std::pow(chance, same_ - 1) < std::exp(-kClear * kClear);
+    return same_ >= kNoChance && reads_finely() && is_no_chance(std::max(single_.share, again_.share), same_ - 1);
   }
 
  private:

@@ -44,12 +44,9 @@ class ContactDetector {
   [[nodiscard]] ContactMode mode() const { return mode_; }
   /// When the wheels last left the ground or met it; nothing if that was not seen.
   [[nodiscard]] std::optional<TimeNs> since_ns() const { return since_ns_; }
-  /// Beams whose last reading is no new one, and those that give the same range again and again.
-  [[nodiscard]] std::bitset<kMaxBeams> repeating_beams() const {
-    return ground_ ? ground_->repeating_beams() : std::bitset<kMaxBeams>{};
-  }
-  [[nodiscard]] std::bitset<kMaxBeams> stuck_beams() const {
-    return ground_ ? ground_->stuck_beams() : std::bitset<kMaxBeams>{};
+  /// Of which beams this is true: BeamRepeats::repeats, BeamRepeats::stuck.
+  [[nodiscard]] std::bitset<kMaxBeams> beams_that(BeamRepeats::Property property) const {
+    return ground_ ? ground_->beams_that(property) : std::bitset<kMaxBeams>{};
   }
 
  private:

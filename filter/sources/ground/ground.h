@@ -36,9 +36,10 @@ class Ground {
   [[nodiscard]] bool flies_at(TimeNs t_ns) const { return contact_.mode() != ContactMode::unknown && !rolls_at(t_ns); }
   /// Have the lasers seen the ground since it was last touched?
   [[nodiscard]] bool known() const { return running_.known; }
-  /// Beams whose last reading is no new one, and those that give the same range again and again.
-  [[nodiscard]] std::bitset<kMaxBeams> repeating_beams() const { return contact_.repeating_beams(); }
-  [[nodiscard]] std::bitset<kMaxBeams> stuck_beams() const { return contact_.stuck_beams(); }
+  /// Of which beams this is true: BeamRepeats::repeats, BeamRepeats::stuck.
+  [[nodiscard]] std::bitset<kMaxBeams> beams_that(BeamRepeats::Property property) const {
+    return contact_.beams_that(property);
+  }
 
   /// One reading of the beams: a row each (2)-(4), and one for the axle, which lies along the ground.
   void update(const BeamRanges& reading, const ImuBuffer& imu, CameraUpdate calibration, Ekf& ekf, Records& records);

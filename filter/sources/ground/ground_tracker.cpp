@@ -84,7 +84,7 @@ bool GroundTracker::usable(Beam& beam, double range) const {
   return !beam.repeats.stuck() && is_return(range, lasers_);
 }
 
-std::bitset<kMaxBeams> GroundTracker::beams_that(bool (BeamRepeats::*property)() const) const {
+std::bitset<kMaxBeams> GroundTracker::beams_that(BeamRepeats::Property property) const {
   std::bitset<kMaxBeams> which;
   for (std::size_t i = 0; i < beams_.size(); ++i) which[i] = (beams_[i].repeats.*property)();
   return which;

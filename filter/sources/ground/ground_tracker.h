@@ -41,9 +41,8 @@ class GroundTracker {
   /// Readings in time order. How many beams agreed with the plane tracked so far, and updated it.
   int update(const LaserSample& sample);
 
-  /// Beams whose last reading is no new one, and those that give the same range again and again.
-  [[nodiscard]] std::bitset<kMaxBeams> repeating_beams() const { return beams_that(&BeamRepeats::repeats); }
-  [[nodiscard]] std::bitset<kMaxBeams> stuck_beams() const { return beams_that(&BeamRepeats::stuck); }
+  /// Of which beams this is true: BeamRepeats::repeats, BeamRepeats::stuck.
+  [[nodiscard]] std::bitset<kMaxBeams> beams_that(BeamRepeats::Property property) const;
   [[nodiscard]] int beams() const { return static_cast<int>(beams_.size()); }
   [[nodiscard]] int beams_that_see() const;                    ///< that gave a range they may use, lately
   [[nodiscard]] double height() const { return x_(kHeight); }  ///< of the wheels above the plane [m]
@@ -63,7 +62,6 @@ class GroundTracker {
   };
 
   [[nodiscard]] bool usable(Beam& beam, double range) const;
-  [[nodiscard]] std::bitset<kMaxBeams> beams_that(bool (BeamRepeats::*property)() const) const;
   void predict(double dt);
   void forget();
   void widen_normal(double variance);
