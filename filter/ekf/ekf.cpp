@@ -200,6 +200,12 @@ void Ekf::inflate_motion(double rotation, double velocity, double position) {
   covariance_.inflate(err::theta, Q);
 }
 
+void Ekf::inflate_along(const Eigen::Vector3d& v_W, const Eigen::Vector3d& p_W) {
+  Eigen::Matrix<double, 6, 1> J;
+  J << v_W, p_W;
+  covariance_.inflate(err::nu, Eigen::Matrix<double, 6, 6>(J * J.transpose()));
+}
+
 /// One unknown for turn and velocity, along what the state does. How far the vehicle came has its own: it is known by
 /// the velocity if samples were lost, and then what shows another turn shows no other place.
 void Ekf::inflate_time(double seconds) {

@@ -88,6 +88,8 @@ class Ekf {
   /// The vehicle may be turned, faster and elsewhere by these standard deviations [rad, m/s, m], each axis, whatever
   /// was measured so far.
   void inflate_motion(double rotation, double velocity, double position);
+  /// It may be faster and elsewhere by these [m/s, m] times one unknown of standard deviation 1.
+  void inflate_along(const Eigen::Vector3d& v_W, const Eigen::Vector3d& p_W);
   /// By that of the time that passed [s]: turn and velocity by one unknown, the place by another.
   void inflate_time(double seconds);
   /// The entries from `first` on may be elsewhere by these standard deviations besides, each by itself.

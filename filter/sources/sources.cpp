@@ -35,8 +35,17 @@ Sources::Sources(const FilterConfig& config, const Calibration& calibration)
   normal_walk_ = config.odometer.normal_walk;
 }
 
-void Sources::inflate_after_takeoff(Ekf& ekf) {
+/// The wheels held the vehicle on the ground while it rose: by what it climbs faster, as beams see, its velocity is
+/// off, and its position by what that came to on the height that it has. One unknown, along the normal.
+void Sources::inflate_after_takeoff(Ekf& ekf) const {
   ekf.inflate_motion(0.0, kTakeoffVelocity, kTakeoffVelocity * kSilent);  // for so long unnoticed
+  const Eigen::Vector3d& n_W = ekf.state().ground.n_W;
+  const double climb = ground_.climb();
+  const double held = climb - n_W.dot(ekf.state().imu.v_W);
+  if (climb > 0.0 && held > 0.0) {
+    const double share = std::min(1.0, held / climb);
+    ekf.inflate_along(held * n_W, share * std::max(0.0, ground_.height()) * n_W);
+  }
   ekf.discard_bias_changes();
 }
 

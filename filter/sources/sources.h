@@ -74,7 +74,7 @@ class Sources {
   [[nodiscard]] ImuScore& imu_score() { return imu_score_; }
 
  private:
-  static void inflate_after_takeoff(Ekf& ekf);
+  void inflate_after_takeoff(Ekf& ekf) const;
   /// Do wheels carry the vehicle, and for long enough that readings count?
   [[nodiscard]] bool rolls_at(TimeNs t_ns) const { return wheels_ && ground_.rolls_at(t_ns); }
   [[nodiscard]] ImuNoiseFactors imu_noise(const Advice& advice) const;

@@ -243,6 +243,21 @@ TEST_CASE("ekf: inflated motion is about the body, inflated biases are each sens
   CHECK(after(err::b_a, err::b_a) == doctest::Approx(before(err::b_a, err::b_a) + 0.25));
 }
 
+TEST_CASE("ekf: what was held down is one error of velocity and position, along what it was held against") {
+  Ekf ekf = started();
+  const Eigen::MatrixXd before = ekf.covariance().matrix();
+  const Eigen::Vector3d v_W(0.1, -0.2, 0.3);
+  const Eigen::Vector3d p_W = 0.25 * v_W;
+  ekf.inflate_along(v_W, p_W);
+  const Eigen::MatrixXd grown = ekf.covariance().matrix() - before;
+  CHECK(grown.block<3, 3>(err::nu, err::nu).isApprox(v_W * v_W.transpose(), 1e-12));
+  CHECK(grown.block<3, 3>(err::rho, err::rho).isApprox(p_W * p_W.transpose(), 1e-12));
+  CHECK(grown.block<3, 3>(err::rho, err::nu).isApprox(p_W * v_W.transpose(), 1e-12));
+  CHECK(grown.block<3, 3>(err::nu, err::rho).isApprox(v_W * p_W.transpose(), 1e-12));
+  CHECK(grown.topRows<3>().norm() == 0.0);
+  CHECK(grown.bottomRows(grown.rows() - err::b_g).norm() == 0.0);
+}
+
 TEST_CASE("ekf: an unknown time is one error of turn and velocity, and one of the place, along what the state does") {
   Ekf ekf = started();
   const ImuBuffer imu = samples();
