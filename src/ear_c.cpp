@@ -150,7 +150,8 @@ ear::Calibration calibration_of(const ear_calibration& from) {
                      from.accel_random_walk,
                      sigma_of(from.gyro_bias_sigma),
                      sigma_of(from.accel_bias_sigma),
-                     sigma_of(from.gyro_scale_sigma)};
+                     sigma_of(from.gyro_scale_sigma),
+                     sigma_of(from.accel_scale_sigma)};
   const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> M(from.gyro_matrix);
   if (!M.isZero(0.0)) calibration.imu.gyro_matrix = M;
   calibration.camera_time_offset_sigma = sigma_of(from.camera_time_offset_sigma);

@@ -32,7 +32,7 @@ void Covariance::reset(const Eigen::VectorXd& sigma) {
   P_.topLeftCorner(size_, size_).diagonal() = sigma.cwiseAbs2();
 }
 
-void Covariance::propagate(const ErrorTransition& transition, const GyroEffect& by_matrix,
+void Covariance::propagate(const ErrorTransition& transition, const MatrixEffect& by_matrix,
                            const Eigen::Matrix<double, 3, 2>& B, double normal_variance) {
   // delta + B^T theta is the normal's error in the world, which motion does not touch. So delta changes by -B^T times
   // what theta does: a part of the gyroscope's bias and matrix, and noise.
@@ -45,15 +45,20 @@ void Covariance::propagate(const ErrorTransition& transition, const GyroEffect& 
   auto P = P_.topLeftCorner(size_, size_);
   carry(P);
   Eigen::Matrix<double, 9, n> effect = Eigen::Matrix<double, 9, n>::Zero();
-  effect.leftCols<9>() = by_matrix.transpose();
-  effect.rightCols<2>() = -by_matrix.topRows<3>().transpose() * B;
+  effect.leftCols<9>() = by_matrix.gyro.transpose();
+  effect.rightCols<2>() = -by_matrix.gyro.topRows<3>().transpose() * B;
+  const Eigen::Matrix<double, 9, 6> accel_effect = by_matrix.accel.transpose();
   for (int column = 0; column < n; ++column) {
     if (column >= err::b_g && column < err::normal) continue;  // they do nothing to the biases
     P.col(column).noalias() += P.middleCols<9>(err::gyro_matrix).lazyProduct(effect.col(column));
   }
+  for (int column = 0; column < 6; ++column) {
+    P.col(err::nu + column).noalias() += P.middleCols<9>(err::accel_matrix).lazyProduct(accel_effect.col(column));
+  }
   Eigen::Matrix<double, n, n> corner = P.topLeftCorner<n, n>().transpose();
   carry(corner);
   corner.noalias() += P.block<9, n>(err::gyro_matrix, 0).transpose().lazyProduct(effect);
+  corner.middleCols<6>(err::nu).noalias() += P.block<9, n>(err::accel_matrix, 0).transpose().lazyProduct(accel_effect);
   corner.topLeftCorner<err::imu_size, err::imu_size>() += transition.Q;
   const Eigen::Matrix<double, 2, 3> to_normal = -B.transpose();
   const Eigen::Matrix<double, 2, err::imu_size> normal_Q = to_normal * transition.Q.topRows<3>();

@@ -25,9 +25,9 @@ class Covariance {
   [[nodiscard]] Eigen::Block<const Eigen::MatrixXd> matrix() const { return P_.topLeftCorner(size_, size_); }
 
   /// The inertial part moves on; all else stays where it is in the world. So does the ground's normal, whose error is
-  /// counted from that of the body's rotation; `B`: its tangent basis. `by_matrix`: what errors of the gyroscope's
-  /// matrix do meanwhile. `normal_variance` [rad^2]: what the ground may have turned, each axis.
-  void propagate(const ErrorTransition& transition, const GyroEffect& by_matrix, const Eigen::Matrix<double, 3, 2>& B,
+  /// counted from that of the body's rotation; `B`: its tangent basis. `by_matrix`: what errors of the
+  /// inertial sensors' matrices do meanwhile. `normal_variance` [rad^2]: what the ground may have turned, each axis.
+  void propagate(const ErrorTransition& transition, const MatrixEffect& by_matrix, const Eigen::Matrix<double, 3, 2>& B,
                  double normal_variance);
 
   /// Makes the `sigma.size()` entries from `first` on unknown anew: these standard deviations, no correlations.

@@ -105,7 +105,7 @@ std::optional<TimeNs> Ekf::propagate(const ImuBuffer& samples, TimeNs t_ns, cons
   std::optional<TimeNs> uncertain_ns;
   if (t_ns <= state_.imu.t_ns) return uncertain_ns;
   std::optional<ErrorTransition> total;
-  GyroEffect by_matrix = GyroEffect::Zero();
+  MatrixEffect by_matrix;
   const double duration = seconds_between(state_.imu.t_ns, t_ns);
   samples.for_each_piece(
       state_.imu.t_ns, t_ns,
@@ -115,7 +115,8 @@ std::optional<TimeNs> Ekf::propagate(const ImuBuffer& samples, TimeNs t_ns, cons
         if (factors.gyro * calibration_.imu.gyro_noise * std::sqrt(dt) > kUncertainTurn && !uncertain_ns)
           uncertain_ns = state_.imu.t_ns;
         const ErrorTransition step = error_transition(state_.imu, gyro_B, accel_B, dt, noise);
-        chain(by_matrix, step, gyro_B - state_.imu.b_g);
+        chain(by_matrix.gyro, step, gyro_B - state_.imu.b_g);
+        chain(by_matrix.accel, step, accel_B - state_.imu.b_a);
         if (total) {
           chain(kernels_, *total, step);
         } else {
@@ -131,7 +132,7 @@ std::optional<TimeNs> Ekf::propagate(const ImuBuffer& samples, TimeNs t_ns, cons
       });
   state_.imu.t_ns = t_ns;
   // Without a camera only what tilts the body counts: the heading would follow wheels whose track width is a guess.
-  if (calibration_.cameras.empty()) leave_out_heading(by_matrix, state_.imu);
+  if (calibration_.cameras.empty()) leave_out_heading(by_matrix.gyro, state_.imu);
   last_.turns = last_.mean_rate_B.norm() > kAboveNoise * usual.gyro * calibration_.imu.gyro_noise;
   const double distance = state_.imu.v_W.norm() * duration;
   covariance_.propagate(total.value_or(ErrorTransition{}), by_matrix, tangent_basis(state_.ground.n_W),

@@ -38,6 +38,7 @@ void require_sigmas(const Calibration& calibration) {
   require_sigma(calibration.imu.gyro_bias_sigma, "calibration: gyro_bias_sigma must be positive");
   require_sigma(calibration.imu.accel_bias_sigma, "calibration: accel_bias_sigma must be positive");
   require_sigma(calibration.imu.gyro_scale_sigma, "calibration: gyro_scale_sigma must be positive");
+  require_sigma(calibration.imu.accel_scale_sigma, "calibration: accel_scale_sigma must be positive");
   if (const auto& encoder = calibration.encoder) {
     require(encoder->stamp_sigma >= 0.0 && std::isfinite(encoder->stamp_sigma),
             "calibration: the encoder's stamp_sigma must not be negative");
@@ -127,6 +128,7 @@ FilterConfig settings_for(const FilterConfig& config, const Calibration& calibra
   prior.gyro_bias = calibration.imu.gyro_bias_sigma.value_or(prior.gyro_bias);
   prior.accel_bias = calibration.imu.accel_bias_sigma.value_or(prior.accel_bias);
   prior.gyro_scale = calibration.imu.gyro_scale_sigma.value_or(prior.gyro_scale);
+  prior.accel_scale = calibration.imu.accel_scale_sigma.value_or(prior.accel_scale);
   prior.gyro_unseen = calibration.imu.gyro_scale_sigma.value_or(prior.gyro_unseen);
   prior.gyro_axes_unseen = calibration.imu.gyro_scale_sigma.value_or(prior.gyro_axes_unseen);
   prior.time_offset = calibration.camera_time_offset_sigma.value_or(prior.time_offset);

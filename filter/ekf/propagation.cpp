@@ -7,7 +7,7 @@ namespace ear {
 
 ImuState integrate(const ImuState& x, const Eigen::Vector3d& gyro_B, const Eigen::Vector3d& accel_B, double dt) {
   const Eigen::Vector3d phi = x.rate_B(gyro_B) * dt;
-  const Eigen::Vector3d f_B = accel_B - x.b_a;
+  const Eigen::Vector3d f_B = x.force_B(accel_B);
   ImuState next = x;
   next.R_WB = renormalized(x.R_WB * exp_so3(phi));
   next.v_W = x.v_W + kGravity_W * dt + x.R_WB * (gamma<1>(phi) * f_B) * dt;
@@ -31,7 +31,7 @@ BodyMotion motion_at(TimeNs t_ns, const ImuState& x, const ImuBuffer& samples) {
   Eigen::Matrix3d turned = Eigen::Matrix3d::Identity();  // from the body then to the body now
   Eigen::Vector3d gained = Eigen::Vector3d::Zero();      // velocity, in the body then, without gravity
   samples.for_each_piece(t_ns, x.t_ns, [&](const Eigen::Vector3d& gyro_B, const Eigen::Vector3d& accel_B, double dt) {
-    gained += turned * (accel_B - x.b_a) * dt;
+    gained += turned * x.force_B(accel_B) * dt;
     turned *= exp_so3(x.rate_B(gyro_B) * dt);
   });
   motion.R_WB = x.R_WB * turned.transpose();
@@ -57,7 +57,7 @@ NavState nav_state(const ImuState& x) {
 ErrorTransition error_transition(const ImuState& x, const Eigen::Vector3d& gyro_B, const Eigen::Vector3d& accel_B,
                                  double dt, const ImuCalibration& noise) {
   const Eigen::Vector3d phi = x.rate_B(gyro_B) * dt;
-  const Eigen::Vector3d f_B = accel_B - x.b_a;
+  const Eigen::Vector3d f_B = x.force_B(accel_B);
   const Eigen::Matrix3d G1 = gamma<1>(phi);
   const Eigen::Matrix3d G2 = gamma<2>(phi);
   const Eigen::Vector3d v_next = x.v_W + kGravity_W * dt + x.R_WB * (G1 * f_B) * dt;
@@ -74,6 +74,7 @@ ErrorTransition error_transition(const ImuState& x, const Eigen::Vector3d& gyro_
   B_accel.topRows<3>().setZero();
   B_accel.middleRows<3>(3) = -x.R_WB * G1 * dt;
   B_accel.bottomRows<3>() = -x.R_WB * G2 * (dt * dt);
+  B_accel *= x.accel_matrix;
 
   ErrorTransition step;
   const Eigen::Matrix3d g_cross = skew(kGravity_W);
@@ -116,6 +117,16 @@ void chain(GyroEffect& total, const ErrorTransition& step, const Eigen::Vector3d
   nu += Phi.block<3, 3>(err::nu, err::theta).lazyProduct(theta);
   for (int axis = 0; axis < 3; ++axis) {
     total.middleCols<3>(3 * axis) -= measured_B(axis) * Phi.block<9, 3>(err::theta, err::b_g);
+  }
+}
+
+/// force = A^ (I + E) measured, likewise; it turns nothing.
+void chain(AccelEffect& total, const ErrorTransition& step, const Eigen::Vector3d& measured_B) {
+  auto nu = total.topRows<3>();
+  auto rho = total.bottomRows<3>();
+  rho += step.Phi.block<3, 3>(err::rho, err::nu).lazyProduct(nu);
+  for (int axis = 0; axis < 3; ++axis) {
+    total.middleCols<3>(3 * axis) -= measured_B(axis) * step.Phi.block<6, 3>(err::nu, err::b_a);
   }
 }
 

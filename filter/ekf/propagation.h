@@ -61,11 +61,17 @@ struct BodyMotion {
 /// `total` followed by `step`.
 void chain(const FilterKernels& kernels, ErrorTransition& total, const ErrorTransition& step);
 
-/// What errors of the gyroscope's matrix do to (theta, nu, rho).
+/// What errors of the gyroscope's matrix do to (theta, nu, rho), and of the accelerometer's to (nu, rho).
 using GyroEffect = Eigen::Matrix<double, 9, 9>;
+using AccelEffect = Eigen::Matrix<double, 6, 9>;
+struct MatrixEffect {
+  GyroEffect gyro = GyroEffect::Zero();
+  AccelEffect accel = AccelEffect::Zero();
+};
 
-/// `total` followed by `step`, in which the gyroscope measures `measured_B` without its bias [rad/s].
+/// `total` followed by `step`, in which the sensor measures `measured_B` without its bias [rad/s; m/s^2].
 void chain(GyroEffect& total, const ErrorTransition& step, const Eigen::Vector3d& measured_B);
+void chain(AccelEffect& total, const ErrorTransition& step, const Eigen::Vector3d& measured_B);
 /// Without the turn about the vertical that there is in the effect, which has just come to `x`.
 void leave_out_heading(GyroEffect& effect, const ImuState& x);
 

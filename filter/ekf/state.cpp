@@ -48,6 +48,7 @@ void boxplus(State& x, const Eigen::Ref<const Eigen::VectorXd>& d) {
     lens.principal_point += change.tail<2>();
   }
   x.camera.time_offset += d(err::time_offset);
+  x.imu.accel_matrix *= Eigen::Matrix3d::Identity() + Eigen::Map<const Eigen::Matrix3d>(d.data() + err::accel_matrix);
   x.imu.gyro_matrix *= Eigen::Matrix3d::Identity() + Eigen::Map<const Eigen::Matrix3d>(d.data() + err::gyro_matrix);
   for (std::size_t i = 0; i < x.clones.size(); ++i) {
     const int at = err::clone(static_cast<int>(i));

@@ -2,7 +2,7 @@
 // error"):
 //   R = Exp(theta) R^, v = Exp(theta) v^ + nu, p = Exp(theta) p^ + rho; clones alike; n = Exp(theta) Exp(B delta) n^;
 //   biases and calibration additive, wheels relative, rotations of the cameras R = Exp(phi) R^, of the odometer R = R^
-//   Exp(phi), the gyroscope's matrix M = M^ (I + E).
+//   Exp(phi), the matrices of gyroscope and accelerometer M = M^ (I + E).
 #pragma once
 
 #include <Eigen/Core>
@@ -23,19 +23,20 @@ inline const Eigen::Vector3d kGravity_W{0.0, 0.0, -9.81};  ///< [m/s^2]
 namespace err {
 inline constexpr int theta = 0, nu = 3, rho = 6, b_g = 9, b_a = 12;
 inline constexpr int imu_size = 15;
-inline constexpr int normal = imu_size;              ///< delta, tilt of the ground's normal [rad]: 2
-inline constexpr int wheel_radius = normal + 2;      ///< left, right, relative: 2
-inline constexpr int track_width = normal + 4;       ///< relative: 1
-inline constexpr int odometer = normal + 5;          ///< phi, turn of O about its own axes [rad]: 3
-inline constexpr int axle = odometer + 3;            ///< position of O in the body [m]: 3
-inline constexpr int encoder_offset = axle + 3;      ///< [s] of the encoders' clock: 1
-inline constexpr int readings = encoder_offset + 1;  ///< what the last two of the encoders are off by [m]: 2
-inline constexpr int beams = readings + 2;           ///< offset of each laser beam's range [m]
-inline constexpr int camera = beams + kMaxBeams;     ///< phi, p of camera 0 in the body: 6
-inline constexpr int stereo = camera + 6;            ///< phi, p of camera 1 in camera 0: 6
-inline constexpr int baseline = stereo + 3;          ///< its p
-inline constexpr int poses_size = 12;                ///< of these two
-inline constexpr int lenses = camera + poses_size;   ///< focal length, principal point of cameras 0 and 1: 3 each
+inline constexpr int normal = imu_size;                 ///< delta, tilt of the ground's normal [rad]: 2
+inline constexpr int wheel_radius = normal + 2;         ///< left, right, relative: 2
+inline constexpr int track_width = normal + 4;          ///< relative: 1
+inline constexpr int odometer = normal + 5;             ///< phi, turn of O about its own axes [rad]: 3
+inline constexpr int axle = odometer + 3;               ///< position of O in the body [m]: 3
+inline constexpr int encoder_offset = axle + 3;         ///< [s] of the encoders' clock: 1
+inline constexpr int readings = encoder_offset + 1;     ///< what the last two of the encoders are off by [m]: 2
+inline constexpr int beams = readings + 2;              ///< offset of each laser beam's range [m]
+inline constexpr int accel_matrix = beams + kMaxBeams;  ///< E of the accelerometer, column by column: 9
+inline constexpr int camera = accel_matrix + 9;         ///< phi, p of camera 0 in the body: 6
+inline constexpr int stereo = camera + 6;               ///< phi, p of camera 1 in camera 0: 6
+inline constexpr int baseline = stereo + 3;             ///< its p
+inline constexpr int poses_size = 12;                   ///< of these two
+inline constexpr int lenses = camera + poses_size;      ///< focal length, principal point of cameras 0 and 1: 3 each
 inline constexpr int lens_size = 3;
 [[nodiscard]] constexpr int lens(int index) { return lenses + lens_size * index; }
 inline constexpr int time_offset = lenses + 2 * lens_size;  ///< [s]
@@ -47,7 +48,7 @@ inline constexpr int clone_size = 6;  ///< theta, rho
 }  // namespace err
 
 /// Columns of a wheel or laser row: from err::nu to the end of the beams.
-inline constexpr int kGroundColumns = err::camera - err::nu;
+inline constexpr int kGroundColumns = err::accel_matrix - err::nu;
 /// Column of an entry of the error vector in such a row.
 [[nodiscard]] constexpr int ground_column(int entry) { return entry - err::nu; }
 
@@ -74,10 +75,14 @@ struct ImuState {
   /// M, true = M measured rate: scales of the axes, and where they point against those of the accelerometer, which are
   /// the body's.
   Eigen::Matrix3d gyro_matrix = Eigen::Matrix3d::Identity();
+  /// A, true = A measured specific force.
+  Eigen::Matrix3d accel_matrix = Eigen::Matrix3d::Identity();
 
   [[nodiscard]] Pose T_WB() const { return {R_WB, p_WB}; }
   /// The body's rate where the gyroscope measures `gyro_B` [rad/s].
   [[nodiscard]] Eigen::Vector3d rate_B(const Eigen::Vector3d& gyro_B) const { return gyro_matrix * (gyro_B - b_g); }
+  /// The body's specific force where the accelerometer measures `accel_B` [m/s^2].
+  [[nodiscard]] Eigen::Vector3d force_B(const Eigen::Vector3d& accel_B) const { return accel_matrix * (accel_B - b_a); }
 };
 
 /// The plane that the wheels stand on.

@@ -139,7 +139,7 @@ std::optional<StartState> Start::as_given(TimeNs t_ns, const ImuBuffer& imu) {
   start.sigma.segment<3>(err::nu).setConstant(kFastest);  // it is measured below
   if (given_->gyro_bias_sigma) start.sigma.segment<3>(err::b_g).setConstant(*given_->gyro_bias_sigma);
   if (given_->accel_bias_sigma) start.sigma.segment<3>(err::b_a).setConstant(*given_->accel_bias_sigma);
-  start.H.setZero(3, err::imu_size);
+  start.H.setZero(3, err::camera);
   start.H.middleCols<3>(err::theta) = -skew(given.v_W) / given_->velocity_sigma;
   start.H.middleCols<3>(err::nu) = Eigen::Matrix3d::Identity() / given_->velocity_sigma;
   start.residual.setZero(3);
@@ -160,16 +160,19 @@ std::optional<StartState> Start::standing(TimeNs t_ns, const ImuStatistics& imu)
   // What the force measures beyond gravity's known size can only be bias.
   const Eigen::Vector3d gravity_B = -(x.R_WB.transpose() * kGravity_W);
 
-  // force = R^T (-g) + b_a + n, rate = b_g + n; with the invariant error, R^T u = R^^T (u + [u]x theta).
+  // force = (I - E) R^T (-g) + b_a + n, rate = b_g + n; with the invariant error, R^T u = R^^T (u + [u]x theta).
   const double root_duration = std::sqrt(imu.duration);
   const auto as_shown = [](double stated, double shown) { return shown > kClear * stated ? shown : stated; };
   const double accel_sigma =
       as_shown(std::hypot(calibration_.imu.accel_noise / root_duration, kShakenAccel), imu.accel_error);
   const double gyro_sigma = as_shown(calibration_.imu.gyro_noise / root_duration, imu.gyro_error);
-  start.H.setZero(6, err::imu_size);
+  start.H.setZero(6, err::camera);
   start.residual.setZero(6);  // that of the rate stays
   start.H.block<3, 3>(0, err::theta) = x.R_WB.transpose() * skew(-kGravity_W) / accel_sigma;
   start.H.block<3, 3>(0, err::b_a) = Eigen::Matrix3d::Identity() / accel_sigma;
+  for (int axis = 0; axis < 3; ++axis) {
+    start.H.block<3, 3>(0, err::accel_matrix + 3 * axis) = -gravity_B(axis) * Eigen::Matrix3d::Identity() / accel_sigma;
+  }
   start.residual.head<3>() = (imu.accel_mean - gravity_B) / accel_sigma;
   start.H.block<3, 3>(3, err::b_g) = Eigen::Matrix3d::Identity() / gyro_sigma;
   return start;
@@ -185,12 +188,16 @@ StartState Start::in_motion(const StartAttempt& attempt) const {
   start.sigma.segment<3>(err::nu).setConstant(kMovingVelocity * (1.0 + start.x.v_W.norm()));
   if (!attempt.information) return start;
   const Eigen::Matrix3d R_BW = start.x.R_WB.transpose();
-  Eigen::Matrix<double, StartFit::motion_size, err::imu_size> J;
+  Eigen::Matrix<double, StartFit::motion_size, err::camera> J;
   J.setZero();
   J.block<3, 3>(StartFit::velocity, err::nu) = R_BW;
   J.block<3, 3>(StartFit::gravity, err::theta) = R_BW * skew(kGravity_W);
   J.block<3, 3>(StartFit::gyro_bias, err::b_g).setIdentity();
   J.block<3, 3>(StartFit::accel_bias, err::b_a).setIdentity();
+  const Eigen::Vector3d gravity_B = -(R_BW * kGravity_W);
+  for (int axis = 0; axis < 3; ++axis) {
+    J.block<3, 3>(StartFit::accel_bias, err::accel_matrix + 3 * axis) = -gravity_B(axis) * Eigen::Matrix3d::Identity();
+  }
   start.H = attempt.information->llt().matrixU() * J / kWorstFit;
   start.residual.setZero(StartFit::motion_size);
   start.imu_noise = attempt.imu_noise;
@@ -223,6 +230,7 @@ Eigen::VectorXd Start::sigma() const {
   Eigen::Matrix3d gyro = Eigen::Matrix3d::Constant(unseen ? prior.gyro_axes_unseen : prior.gyro_scale);
   if (unseen) gyro.diagonal().setConstant(prior.gyro_unseen);
   sigma.segment<9>(err::gyro_matrix) = gyro.reshaped();
+  sigma.segment<9>(err::accel_matrix).setConstant(prior.accel_scale);
   for (std::size_t i = 0; online.intrinsics && i < calibration_.cameras.size(); ++i) {
     sigma.segment<err::lens_size>(err::lens(static_cast<int>(i))) = lens_sigma(prior, calibration_.cameras[i]);
   }

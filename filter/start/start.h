@@ -21,9 +21,10 @@ namespace ear {
 struct StartState {
   ImuState x;
   Eigen::VectorXd sigma;  ///< standard deviations of the whole error vector
-  /// Whitened, residual = H e + n, by the inertial part: what the mean samples show of attitude and biases of a vehicle
-  /// that stands, what was given of the velocity, or what the fit to the images of one in motion knows. Else no rows.
-  Eigen::Matrix<double, Eigen::Dynamic, err::imu_size> H;
+  /// Whitened, residual = H e + n, by what comes before the cameras: what the mean samples show of attitude and biases
+  /// of a vehicle that stands, what was given of the velocity, or what the fit to the images of one in motion knows.
+  /// Else no rows.
+  Eigen::Matrix<double, Eigen::Dynamic, err::camera> H;
   Eigen::VectorXd residual;
   std::optional<ImuNoiseFactors> imu_noise;  ///< on the stated noise, as the images of one in motion show it
   bool from_frames = false;  ///< in motion, at the first of the frames kept: all of them are to be taken in

@@ -48,13 +48,14 @@ struct CameraCalibration {
 /// Continuous-time noise of the IMU, EuRoC's keys.
 struct ImuCalibration {
   double rate_hz = 200.0;
-  double gyro_noise = 1e-3;                ///< [rad/s/sqrt(Hz)]
-  double gyro_random_walk = 2e-5;          ///< [rad/s^2/sqrt(Hz)]
-  double accel_noise = 1e-2;               ///< [m/s^2/sqrt(Hz)]
-  double accel_random_walk = 3e-4;         ///< [m/s^3/sqrt(Hz)]
-  std::optional<double> gyro_bias_sigma;   ///< [rad/s] of the bias at the start, about zero
-  std::optional<double> accel_bias_sigma;  ///< [m/s^2]
-  std::optional<double> gyro_scale_sigma;  ///< relative; also of one axis in turns about another
+  double gyro_noise = 1e-3;                 ///< [rad/s/sqrt(Hz)]
+  double gyro_random_walk = 2e-5;           ///< [rad/s^2/sqrt(Hz)]
+  double accel_noise = 1e-2;                ///< [m/s^2/sqrt(Hz)]
+  double accel_random_walk = 3e-4;          ///< [m/s^3/sqrt(Hz)]
+  std::optional<double> gyro_bias_sigma;    ///< [rad/s] of the bias at the start, about zero
+  std::optional<double> accel_bias_sigma;   ///< [m/s^2]
+  std::optional<double> gyro_scale_sigma;   ///< relative; also of one axis in turns about another
+  std::optional<double> accel_scale_sigma;  ///< the same of the accelerometer, in forces along another axis
   /// M, where the axes are not perpendicular or of a wrong scale: rate = M measured. The filter learns what is left.
   Eigen::Matrix3d gyro_matrix = Eigen::Matrix3d::Identity();
 };

@@ -91,6 +91,7 @@ typedef struct {
   double camera_time_offset_sigma;                         /* [s] */
   double gyro_bias_sigma, accel_bias_sigma;                /* [rad/s, m/s^2] */
   double gyro_scale_sigma;                                 /* relative; also of one axis in turns about another */
+  double accel_scale_sigma;                                /* relative; also of one axis in forces along another */
   double gyro_matrix[9];                                   /* row by row: rate = M measured; all 0: the identity */
   double odometer_rotation_sigma, odometer_position_sigma; /* [rad, m] of T_BO */
   double wheel_radius_sigma;                               /* of the mean of both radii [m] */

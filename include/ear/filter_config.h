@@ -24,6 +24,7 @@ struct StandstillConfig {
 struct PriorConfig {
   double gyro_bias = 0.1;             ///< [rad/s]
   double gyro_scale = 3e-3;           ///< relative, of each axis, and how much it measures of turns about another
+  double accel_scale = 3e-3;          ///< relative, of each axis, and how much it measures of forces along another
   double gyro_unseen = 3e-2;          ///< relative, of each axis, where there is no camera
   double gyro_axes_unseen = 1e-2;     ///< how much an axis measures of turns about another, where there is no camera
   double accel_bias = 0.08;           ///< [m/s^2]

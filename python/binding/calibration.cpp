@@ -35,7 +35,8 @@ void bind_imu(py::module_& module) {
              Field{"gyro_noise", &C::gyro_noise}, Field{"gyro_random_walk", &C::gyro_random_walk},
              Field{"accel_noise", &C::accel_noise}, Field{"accel_random_walk", &C::accel_random_walk},
              Field{"gyro_bias_sigma", &C::gyro_bias_sigma}, Field{"accel_bias_sigma", &C::accel_bias_sigma},
-             Field{"gyro_scale_sigma", &C::gyro_scale_sigma}, Field{"gyro_matrix", &C::gyro_matrix});
+             Field{"gyro_scale_sigma", &C::gyro_scale_sigma}, Field{"accel_scale_sigma", &C::accel_scale_sigma},
+             Field{"gyro_matrix", &C::gyro_matrix});
 }
 
 void bind_wheels_and_lasers(py::module_& module) {

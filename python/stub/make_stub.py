@@ -43,7 +43,7 @@ FIELDS = {
     "FeatureFrame.ids": "NDArray[np.uint64]", "FeatureFrame.right_skipped": "bool", "FeatureFrame.repeated": "bool",
     "FeatureFrame.t_ns": "int", "StereoFrame.t_ns": "int",
     "pose_sigma": "PoseSigma | None", "intrinsics_sigma": "IntrinsicsSigma | None",
-    "gyro_bias_sigma": "float | None", "accel_bias_sigma": "float | None", "gyro_scale_sigma": "float | None",
+    "gyro_bias_sigma": "float | None", "accel_bias_sigma": "float | None", "gyro_scale_sigma": "float | None", "accel_scale_sigma": "float | None",
     "T_BO_sigma": "PoseSigma | None", "wheel_radius_sigma": "float | None", "wheel_radius_difference_sigma": "float | None",
     "track_width_sigma": "float | None", "offset_sigma": "float | None", "camera_time_offset_sigma": "float | None",
     "time_offset_sigma": "float | None",

@@ -104,6 +104,7 @@ void read_imu_noise(const YamlMap& map, ImuCalibration& imu) {
   imu.gyro_bias_sigma = map.sigma("gyroscope_bias_sigma");
   imu.accel_bias_sigma = map.sigma("accelerometer_bias_sigma");
   imu.gyro_scale_sigma = map.sigma("gyroscope_scale_sigma");
+  imu.accel_scale_sigma = map.sigma("accelerometer_scale_sigma");
   if (map.has("gyroscope_matrix")) {
     const std::vector<double> rows = map.numbers("gyroscope_matrix", 9);
     imu.gyro_matrix = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(rows.data());

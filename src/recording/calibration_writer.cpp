@@ -85,6 +85,7 @@ void write_imu(const ImuCalibration& imu, const fs::path& folder, const std::str
   file.sigma("gyroscope_bias_sigma", imu.gyro_bias_sigma, "rad/s");
   file.sigma("accelerometer_bias_sigma", imu.accel_bias_sigma, "m/s^2");
   file.sigma("gyroscope_scale_sigma", imu.gyro_scale_sigma, "relative");
+  file.sigma("accelerometer_scale_sigma", imu.accel_scale_sigma, "relative");
   if (!imu.gyro_matrix.isIdentity(0.0)) {
     file.list("gyroscope_matrix", imu.gyro_matrix.reshaped<Eigen::RowMajor>(), 9, "row by row: rate = M measured");
   }

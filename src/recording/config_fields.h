@@ -60,6 +60,7 @@ template <typename C, typename F>
 EnableFor<C, PriorConfig> visit(C& c, F&& f) {
   f("gyro_bias", c.gyro_bias);
   f("gyro_scale", c.gyro_scale);
+  f("accel_scale", c.accel_scale);
   f("gyro_unseen", c.gyro_unseen);
   f("gyro_axes_unseen", c.gyro_axes_unseen);
   f("accel_bias", c.accel_bias);

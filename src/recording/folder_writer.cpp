@@ -87,6 +87,7 @@ void write_imu(const ImuCalibration& imu, const fs::path& folder) {
   file.number("accelerometer_random_walk", imu.accel_random_walk);
   file.number("gyroscope_bias_sigma", imu.gyro_bias_sigma).number("accelerometer_bias_sigma", imu.accel_bias_sigma);
   file.number("gyroscope_scale_sigma", imu.gyro_scale_sigma);
+  file.number("accelerometer_scale_sigma", imu.accel_scale_sigma);
   if (!imu.gyro_matrix.isIdentity(0.0)) {
     const Eigen::Matrix<double, 9, 1> rows = imu.gyro_matrix.reshaped<Eigen::RowMajor>();
     file.line("gyroscope_matrix", list(rows));

@@ -37,11 +37,11 @@ Covariance filled(std::mt19937_64& rng) {
   Covariance P(err::clone(4));
   P.reset(Eigen::VectorXd::Constant(err::clones, 0.5));
   for (int i = 0; i < 2; ++i) {
-    P.propagate(random_transition(rng), random_matrix(rng, 9, 9),
+    P.propagate(random_transition(rng), {random_matrix(rng, 9, 9), random_matrix(rng, 6, 9)},
                 tangent_basis(Eigen::Vector3d(0.1, -0.2, 0.97).normalized()), 0.01);
     P.append_clone(random_matrix(rng, 6, 1));
   }
-  P.propagate(random_transition(rng), random_matrix(rng, 9, 9),
+  P.propagate(random_transition(rng), {random_matrix(rng, 9, 9), random_matrix(rng, 6, 9)},
               tangent_basis(Eigen::Vector3d(0.1, -0.2, 0.97).normalized()), 0.01);
   return P;
 }
@@ -65,7 +65,7 @@ TEST_CASE("covariance: propagation and cloning are the full matrix products") {
   const ErrorTransition transition = random_transition(rng);
   const Eigen::MatrixXd cloned = P.matrix();
   const Eigen::Matrix<double, 3, 2> B = tangent_basis(Eigen::Vector3d(0.2, 0.3, 0.9).normalized());
-  const GyroEffect by_matrix = random_matrix(rng, 9, 9);
+  const MatrixEffect by_matrix{random_matrix(rng, 9, 9), random_matrix(rng, 6, 9)};
   P.propagate(transition, by_matrix, B, 0.02);
   // The normal's error in the world, delta + B^T theta, stays; it walks by itself.
   Eigen::MatrixXd to_world = Eigen::MatrixXd::Identity(P.size(), P.size());
@@ -73,7 +73,8 @@ TEST_CASE("covariance: propagation and cloning are the full matrix products") {
   Eigen::MatrixXd Phi = Eigen::MatrixXd::Identity(P.size(), P.size());
   Eigen::MatrixXd Q = Eigen::MatrixXd::Zero(P.size(), P.size());
   Phi.topLeftCorner<err::imu_size, err::imu_size>() = transition.Phi;
-  Phi.block<9, 9>(0, err::gyro_matrix) = by_matrix;
+  Phi.block<9, 9>(0, err::gyro_matrix) = by_matrix.gyro;
+  Phi.block<6, 9>(err::nu, err::accel_matrix) = by_matrix.accel;
   Q.topLeftCorner<err::imu_size, err::imu_size>() = transition.Q;
   Q.diagonal().segment<2>(err::normal).setConstant(0.02);
   const Eigen::MatrixXd to_body = to_world.inverse();

@@ -201,6 +201,7 @@ TEST_CASE("displacements: the wheels' is that of the body, and needs readings al
   x.imu.R_WB.setIdentity();
   x.imu.b_g.setZero();
   x.imu.gyro_matrix.setIdentity();
+  x.imu.accel_matrix.setIdentity();
   x.ground.n_W = Eigen::Vector3d::UnitZ();
   x.odometer.wheel_radius.setConstant(0.08);
   x.odometer.T_BO = {Eigen::Matrix3d::Identity(), {0.1, 0.0, -0.05}};

@@ -198,6 +198,7 @@ TEST_CASE("ekf: what may be noise shows nothing of the time offset and the gyros
     Eigen::VectorXd sigma = Eigen::VectorXd::Constant(err::clones, 0.1);
     sigma.segment<3>(err::theta).setConstant(1e-3);
     sigma.segment<6>(err::b_g).setConstant(1e-3);
+    sigma.segment<9>(err::accel_matrix).setConstant(1e-3);
     ekf.start(x, sigma);
     ekf.propagate(imu, kStart + 1'000'000'000, {}, 0.0);
     const State before = ekf.state();

@@ -130,7 +130,7 @@ Covariance some_covariance(std::mt19937_64& rng, const State& x) {
   for (std::size_t i = 0; i < x.clones.size(); ++i) {
     ErrorTransition walk;
     walk.Q.diagonal().setConstant(1e-5);
-    P.propagate(walk, GyroEffect::Zero(), tangent_basis(Eigen::Vector3d::UnitZ()), 1e-5);
+    P.propagate(walk, MatrixEffect{}, tangent_basis(Eigen::Vector3d::UnitZ()), 1e-5);
     P.append_clone(random_vector(rng, 0.1).homogeneous().replicate<2, 1>().head<6>());
   }
   return P;

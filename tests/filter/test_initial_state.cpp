@@ -41,6 +41,7 @@ TEST_CASE("initial state: what is stated replaces the prior, the rest stays") {
   calibration.imu.gyro_bias_sigma = 0.016;
   calibration.imu.accel_bias_sigma = 0.017;
   calibration.imu.gyro_scale_sigma = 0.022;
+  calibration.imu.accel_scale_sigma = 0.024;
   calibration.encoder->time_offset_sigma = 0.023;
   calibration.encoder->T_BO_sigma = PoseSigma{0.018, 0.019};
   calibration.encoder->wheel_radius_sigma = 8e-4;
@@ -55,6 +56,7 @@ TEST_CASE("initial state: what is stated replaces the prior, the rest stays") {
   CHECK(prior.gyro_bias == 0.016);
   CHECK(prior.accel_bias == 0.017);
   CHECK(prior.gyro_scale == 0.022);
+  CHECK(prior.accel_scale == 0.024);
   CHECK(prior.gyro_unseen == 0.022);
   CHECK(prior.gyro_axes_unseen == 0.022);
   CHECK(prior.encoder_time_offset == 0.023);

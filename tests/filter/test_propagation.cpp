@@ -110,6 +110,32 @@ TEST_CASE("propagation: what the gyroscope's matrix does is the derivative") {
   }
 }
 
+TEST_CASE("propagation: what the accelerometer's matrix does is the derivative") {
+  std::mt19937_64 rng{15};
+  for (int trial = 0; trial < 20; ++trial) {
+    CAPTURE(trial);
+    const ImuState start = random_state(rng, 0).imu;
+    const double dt = 0.01;
+    AccelEffect effect = AccelEffect::Zero();
+    ImuState end = start;
+    std::vector<Eigen::Vector3d> gyro, accel;
+    for (std::size_t i = 0; i < 5; ++i) {
+      gyro.push_back(random_vector(rng, 1.0));
+      accel.emplace_back(random_vector(rng, 5.0) - kGravity_W);
+      chain(effect, error_transition(end, gyro[i], accel[i], dt, ImuCalibration{}), accel[i] - end.b_a);
+      end = integrate(end, gyro[i], accel[i], dt);
+    }
+    check_jacobian(
+        [&](const Eigen::VectorXd& E) -> Eigen::VectorXd {
+          ImuState x = start;
+          x.accel_matrix *= Eigen::Matrix3d::Identity() + Eigen::Matrix3d(E.reshaped(3, 3));
+          for (std::size_t i = 0; i < gyro.size(); ++i) x = integrate(x, gyro[i], accel[i], dt);
+          return imu_difference(x, end).segment<6>(err::nu);
+        },
+        effect);
+  }
+}
+
 TEST_CASE("propagation: Q is the covariance of many noisy integrations") {
   std::mt19937_64 rng{12};
   std::normal_distribution<double> normal;

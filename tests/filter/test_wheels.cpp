@@ -120,7 +120,7 @@ TEST_CASE("wheels: the Jacobian of one wheel is the derivative, and knows nothin
     return -Eigen::VectorXd::Constant(
         1, both.residual(WheelRows::speed) + 0.5 * moved.odometer.track_width * both.residual(WheelRows::yaw_rate));
   };
-  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(1, err::camera);
+  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(1, err::accel_matrix);
   H.rightCols<kGroundColumns>() = rows.H.row(WheelRows::speed);
   CHECK(std::abs(rows.H(WheelRows::speed, ground_column(err::wheel_radius))) < 1e-12);
   CHECK(rows.H(WheelRows::speed, ground_column(err::wheel_radius) + 1) != 0.0);
@@ -142,7 +142,7 @@ TEST_CASE("wheels: Jacobians of every model are the derivatives") {
         return -rows_of(with_error(x, d), turn, gyro_B, model, normal_known).residual;
       };
       // The attitude and the position do not appear, nor does the cameras' part.
-      Eigen::MatrixXd H = Eigen::MatrixXd::Zero(WheelRows::size, err::camera);
+      Eigen::MatrixXd H = Eigen::MatrixXd::Zero(WheelRows::size, err::accel_matrix);
       H.rightCols<kGroundColumns>() = rows.H;
       check_jacobian(prediction, H);
       const auto by_rate = [&](const Eigen::VectorXd& d) -> Eigen::VectorXd {

@@ -319,7 +319,9 @@ TEST_CASE("calibration: standard deviations beside the values") {
   append("cam1",
          "T_C0C1_sigma: {rotation: 0.0003, position: 0.00005}\n"
          "intrinsics_sigma: {focal_length: 0.4, principal_point: 0.2}\n");
-  append("imu0", "gyroscope_bias_sigma: 0.01\naccelerometer_bias_sigma: 0.2\ngyroscope_scale_sigma: 0.01\n");
+  append("imu0",
+         "gyroscope_bias_sigma: 0.01\naccelerometer_bias_sigma: 0.2\ngyroscope_scale_sigma: "
+         "0.01\naccelerometer_scale_sigma: 0.02\n");
   append("encoder0",
          "T_BS_sigma: {rotation: 0.004, position: 0.003}\nwheel_radius_sigma: 0.0003\n"
          "wheel_radius_difference_sigma: 0.0001\nwheel_separation_sigma: 0.002\nstamp_sigma: 0.004\n");
@@ -338,6 +340,7 @@ TEST_CASE("calibration: standard deviations beside the values") {
   CHECK(c.imu.gyro_bias_sigma == 0.01);
   CHECK(c.imu.accel_bias_sigma == 0.2);
   CHECK(c.imu.gyro_scale_sigma == 0.01);
+  CHECK(c.imu.accel_scale_sigma == 0.02);
   CHECK(c.imu.gyro_matrix.isIdentity(0.0));
   REQUIRE(c.encoder->T_BO_sigma);
   CHECK(c.encoder->T_BO_sigma->rotation == 0.004);
@@ -419,6 +422,7 @@ TEST_CASE("calibration: what is written comes back, in the place of the recordin
   c.imu.gyro_noise = 0.002;
   c.imu.accel_bias_sigma = 0.3;
   c.imu.gyro_scale_sigma = 0.004;
+  c.imu.accel_scale_sigma = 0.005;
   c.imu.gyro_matrix << 1.01, 0.001, -0.002, 0.003, 0.99, -0.004, 0.005, 0.006, 1.02;
   c.encoder->wheel_radius = {0.0751, 0.0749};
   c.encoder->wheel_radius_sigma = 1e-5;
@@ -456,6 +460,7 @@ TEST_CASE("calibration: what is written comes back, in the place of the recordin
   CHECK(back.imu.accel_random_walk == c.imu.accel_random_walk);
   CHECK(back.imu.accel_bias_sigma == 0.3);
   CHECK(back.imu.gyro_scale_sigma == 0.004);
+  CHECK(back.imu.accel_scale_sigma == 0.005);
   CHECK(back.imu.gyro_matrix == c.imu.gyro_matrix);
   CHECK(back.encoder->T_BO.isApprox(c.encoder->T_BO, 1e-10));
   CHECK(back.encoder->T_BO_sigma->position == 2e-3);

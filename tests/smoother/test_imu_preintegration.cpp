@@ -82,7 +82,8 @@ TEST_CASE("imu_preintegration: by hand: a constant push forward, and a turn to t
 TEST_CASE("imu_preintegration: the factor is zero where the state was integrated, and only there") {
   std::mt19937_64 rng{1};
   ImuState i = random_start(rng);
-  i.gyro_matrix.setIdentity();  // the smoother estimates none
+  i.gyro_matrix.setIdentity();
+  i.accel_matrix.setIdentity();  // the smoother estimates none
   const std::vector<Piece> pieces = random_pieces(rng, 40);
   const ImuState j = propagated(i, pieces);
   const ImuFactor factor(preintegrate(pieces, i.b_g, i.b_a));

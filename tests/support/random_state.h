@@ -51,6 +51,7 @@ inline State random_state(std::mt19937_64& rng, int clones) {
     x.clones.push_back(
         {static_cast<std::uint64_t>(i), {body.R * exp_so3(random_vector(rng, 0.1)), body.p + random_vector(rng, 0.3)}});
   }
+  for (int axis = 0; axis < 3; ++axis) x.imu.accel_matrix.col(axis) += random_vector(rng, 0.01);
   for (int axis = 0; axis < 3; ++axis) x.imu.gyro_matrix.col(axis) += random_vector(rng, 0.01);
   return x;
 }

@@ -76,8 +76,11 @@ namespace ear::test {
     d.segment<err::lens_size>(err::lens(camera)) << a.focal_length - b.focal_length,
         a.principal_point - b.principal_point;
   }
-  const Eigen::Matrix3d matrix = estimate.imu.gyro_matrix.inverse() * truth.imu.gyro_matrix;
-  d.segment<9>(err::gyro_matrix) = (matrix - Eigen::Matrix3d::Identity()).reshaped();
+  const auto matrix_error = [](const Eigen::Matrix3d& true_M, const Eigen::Matrix3d& M) {
+    return (M.inverse() * true_M - Eigen::Matrix3d::Identity()).eval();
+  };
+  d.segment<9>(err::accel_matrix) = matrix_error(truth.imu.accel_matrix, estimate.imu.accel_matrix).reshaped();
+  d.segment<9>(err::gyro_matrix) = matrix_error(truth.imu.gyro_matrix, estimate.imu.gyro_matrix).reshaped();
   d(err::time_offset) = truth.camera.time_offset - estimate.camera.time_offset;
   for (std::size_t i = 0; i < estimate.clones.size(); ++i) {
     d.segment<6>(err::clone(static_cast<int>(i))) = invariant_difference(truth.clones[i].T_WB, estimate.clones[i].T_WB);

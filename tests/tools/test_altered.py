@@ -152,6 +152,7 @@ class Hop(unittest.TestCase):
         "camera_third": 0.02,
         "gyro_scale": 0.01,  # 22 mm where the scale is no state
         "gyro_axes": 0.01,  # 11.7 mm where it is no state where they point
+        "accel_axes": 0.0095,  # 10.3 mm where it is no state what they measure
         "wheels_exchanged": 0.02,
         "imu_spikes": 0.012,
         "camera_repeated": 0.015,

@@ -290,6 +290,8 @@ ALTERATIONS = [
                on(["imu0"], each_value((1, 3), lambda x, column: x + (0.05 if column == 3 else -0.05)))),
     Alteration("gyro_scale", "gyroscope that measures 1 % too much", on(["imu0"], each_value(GYRO, lambda x, _: 1.01 * x))),
     Alteration("gyro_axes", "gyroscope whose axes measure 1 % of the turns about the other two", on(["imu0"], through_matrix(LEANING))),
+    Alteration("accel_scale", "accelerometer that measures 1 % too much", on(["imu0"], each_value(ACCEL, lambda x, _: 1.01 * x))),
+    Alteration("accel_axes", "accelerometer whose axes measure 1 % of the forces along the other two", on(["imu0"], through_matrix(LEANING, (ACCEL,)))),
     Alteration("accel_bias", "accelerometer's bias of 0.7 m/s^2 in x and y, nine times what the prior allows",
                on(["imu0"], each_value((4, 5), lambda x, column: x + (0.7 if column == 4 else -0.7)))),
     Alteration("imu_turned", "inertial sensors turned by 90 degrees about the vertical; so the mower's are right",
