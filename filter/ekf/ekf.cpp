@@ -72,6 +72,7 @@ void Ekf::start(const ImuState& x, const Eigen::VectorXd& sigma, bool scale_is_g
   started_ns_ = x.t_ns;
   started_W_ = x.p_WB;
   last_ = {};
+  last_.mean_force_B = -(x.R_WB.transpose() * kGravity_W);
   turned_ = 0.0;
   turned_path_.setZero();
   covariance_.reset(sigma);
@@ -116,14 +117,16 @@ std::optional<TimeNs> Ekf::propagate(const ImuBuffer& samples, TimeNs t_ns, cons
           uncertain_ns = state_.imu.t_ns;
         const ErrorTransition step = error_transition(state_.imu, gyro_B, accel_B, dt, noise);
         chain(by_matrix.gyro, step, gyro_B - state_.imu.b_g);
-        chain(by_matrix.accel, step, accel_B - state_.imu.b_a);
+        const double share = std::min(1.0, dt / kStreamGap);
+        last_.mean_force_B += share * (accel_B - state_.imu.b_a - last_.mean_force_B);
+        chain(by_matrix.accel, step, last_.mean_force_B);
         if (total) {
           chain(kernels_, *total, step);
         } else {
           total = step;
         }
         last_.rate_B = state_.imu.rate_B(gyro_B);
-        last_.mean_rate_B += std::min(1.0, dt / kStreamGap) * (last_.rate_B - last_.mean_rate_B);
+        last_.mean_rate_B += share * (last_.rate_B - last_.mean_rate_B);
         turned_ += state_.imu.R_WB.row(2).dot(last_.rate_B) * dt;
         turned_path_ += turned_ * dt * state_.imu.v_W;
         const Eigen::Vector3d before_W = state_.imu.v_W;

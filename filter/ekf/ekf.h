@@ -128,6 +128,8 @@ class Ekf {
     Eigen::Vector3d rate_B = Eigen::Vector3d::Zero();       ///< [rad/s]
     Eigen::Vector3d accel_W = Eigen::Vector3d::Zero();      ///< [m/s^2]
     Eigen::Vector3d mean_rate_B = Eigen::Vector3d::Zero();  ///< [rad/s]
+    /// Specific force [m/s^2]. One sample is mostly noise: what it does would be learned as errors of the matrix.
+    Eigen::Vector3d mean_force_B = Eigen::Vector3d::Zero();
     bool turns = false;
   } last_;
   std::uint64_t next_frame_ = 0;
