@@ -83,6 +83,11 @@ void Covariance::inflate(int first, const Eigen::Ref<const Eigen::MatrixXd>& Q) 
   P_.block(first, first, Q.rows(), Q.cols()) += Q;
 }
 
+void Covariance::inflate_along(const Eigen::Ref<const Eigen::VectorXd>& J) {
+  assert(J.size() == size_);
+  for (int column = 0; column < size_; ++column) P_.col(column).head(size_) += J(column) * J;
+}
+
 double Covariance::variance(const Eigen::Ref<const Eigen::RowVectorXd>& h, int first_column) const {
   const auto n = h.size();
   double sum = 0.0;

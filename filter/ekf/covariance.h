@@ -35,6 +35,10 @@ class Covariance {
 
   /// Adds an independent error of covariance Q to the Q.rows() entries from `first` on.
   void inflate(int first, const Eigen::Ref<const Eigen::MatrixXd>& Q);
+  /// For size() numbers, up to the next update.
+  [[nodiscard]] Eigen::Ref<Eigen::VectorXd> room() { return correction_.head(size_); }
+  /// Adds J times one independent unknown of standard deviation 1; J has size() entries.
+  void inflate_along(const Eigen::Ref<const Eigen::VectorXd>& J);
 
   /// Variance of the row h of the entries from `first_column` on.
   [[nodiscard]] double variance(const Eigen::Ref<const Eigen::RowVectorXd>& h, int first_column) const;

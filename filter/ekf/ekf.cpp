@@ -178,7 +178,7 @@ void Ekf::clone(double feature_noise, double weight) {
   Eigen::Matrix<double, 6, 1> J_offset;
   J_offset << rate_W, x.v_W + x.p_WB.cross(rate_W);
   covariance_.append_clone(J_offset);
-  state_.clones.push_back({next_frame_++, x.T_WB(), feature_noise, weight});
+  state_.clones.push_back({next_frame_++, x.T_WB(), feature_noise, weight, x.t_ns});
 }
 
 void Ekf::marginalise(std::size_t clone) {
@@ -204,10 +204,19 @@ void Ekf::inflate_motion(double rotation, double velocity, double position) {
   covariance_.inflate(err::theta, Q);
 }
 
-void Ekf::inflate_along(const Eigen::Vector3d& v_W, const Eigen::Vector3d& p_W) {
-  Eigen::Matrix<double, 6, 1> J;
-  J << v_W, p_W;
-  covariance_.inflate(err::nu, Eigen::Matrix<double, 6, 6>(J * J.transpose()));
+/// By a constant force: velocity grows with the time since then, the way with its square.
+void Ekf::inflate_held(const Eigen::Vector3d& v_W, const Eigen::Vector3d& p_W, double duration) {
+  Eigen::Ref<Eigen::VectorXd> J = covariance_.room();
+  J.setZero();
+  J.segment<3>(err::nu) = v_W;
+  J.segment<3>(err::rho) = p_W;
+  for (std::size_t i = 0; i < state_.clones.size(); ++i) {
+    const double share = 1.0 - seconds_between(state_.clones[i].t_ns, state_.imu.t_ns) / duration;
+    if (share > 0.0) J.segment<3>(err::clone(static_cast<int>(i)) + 3) = share * share * p_W;
+  }
+  covariance_.inflate_along(J);
+  bias_changes_ = BiasChanges{};
+  bias_changes_.restarted = true;
 }
 
 /// One unknown for turn and velocity, along what the state does. How far the vehicle came has its own: it is known by
@@ -243,11 +252,6 @@ BiasChanges Ekf::take_bias_changes() {
   const BiasChanges changes = bias_changes_;
   bias_changes_ = BiasChanges{};
   return changes;
-}
-
-void Ekf::discard_bias_changes() {
-  bias_changes_ = BiasChanges{};
-  bias_changes_.restarted = true;
 }
 
 bool Ekf::possible() const {

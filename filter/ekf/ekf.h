@@ -88,8 +88,9 @@ class Ekf {
   /// The vehicle may be turned, faster and elsewhere by these standard deviations [rad, m/s, m], each axis, whatever
   /// was measured so far.
   void inflate_motion(double rotation, double velocity, double position);
-  /// It may be faster and elsewhere by these [m/s, m] times one unknown of standard deviation 1.
-  void inflate_along(const Eigen::Vector3d& v_W, const Eigen::Vector3d& p_W);
+  /// For `duration` [s] measurements held the state back: now by these [m/s, m] times one unknown of standard deviation
+  /// 1, its clones since then by less. What they did to the biases is no change of these.
+  void inflate_held(const Eigen::Vector3d& v_W, const Eigen::Vector3d& p_W, double duration);
   /// By that of the time that passed [s]: turn and velocity by one unknown, the place by another.
   void inflate_time(double seconds);
   /// The entries from `first` on may be elsewhere by these standard deviations besides, each by itself.
@@ -101,8 +102,6 @@ class Ekf {
 
   /// Since the last call.
   [[nodiscard]] BiasChanges take_bias_changes();
-  /// What updates did so far was misled by another source.
-  void discard_bias_changes();
 
   [[nodiscard]] const State& state() const { return state_; }
   [[nodiscard]] const Covariance& covariance() const { return covariance_; }

@@ -138,6 +138,7 @@ struct Clone {
   Pose T_WB;
   double feature_noise = 1.0;  ///< standard deviation of what was seen from it, times the usual
   double weight = 1.0;         ///< (15) of what was seen from it: the noise of a feature that fits is divided by it
+  TimeNs t_ns = 0;
 };
 
 struct State {

@@ -6,6 +6,7 @@
 #include "filter/ekf/imu_displacement.h"
 #include "filter/ekf/initial_state.h"
 #include "filter/ingest/limits.h"
+#include "filter/sources/ground/ground_rows.h"
 
 namespace ear {
 namespace {
@@ -35,18 +36,24 @@ Sources::Sources(const FilterConfig& config, const Calibration& calibration)
   normal_walk_ = config.odometer.normal_walk;
 }
 
-/// The wheels held the vehicle on the ground while it rose: by what it climbs faster, as beams see, its velocity is
-/// off, and its position by what that came to on the height that it has. One unknown, along the normal.
+/// The wheels held the vehicle on the ground while it rose. By what it climbs faster, as beams see, its velocity is
+/// off, and position and clones by what that came to. Then the beams' climb is measured.
 void Sources::inflate_after_takeoff(Ekf& ekf) const {
   ekf.inflate_motion(0.0, kTakeoffVelocity, kTakeoffVelocity * kSilent);  // for so long unnoticed
-  const Eigen::Vector3d& n_W = ekf.state().ground.n_W;
+  const Eigen::Vector3d n_W = ekf.state().ground.n_W;
+  const ClimbPrediction predicted = predict_climb(ekf.state());
   const double climb = ground_.climb();
-  const double held = climb - n_W.dot(ekf.state().imu.v_W);
-  if (climb > 0.0 && held > 0.0) {
-    const double share = std::min(1.0, held / climb);
-    ekf.inflate_along(held * n_W, share * std::max(0.0, ground_.height()) * n_W);
-  }
-  ekf.discard_bias_changes();
+  const double held = climb > 0.0 ? std::max(0.0, climb - predicted.speed) : 0.0;
+  const double rose_for = climb > 0.0 ? 2.0 * std::max(0.0, ground_.height()) / climb : 0.0;  // by a constant force
+  ekf.inflate_held(held * n_W, 0.5 * rose_for * std::min(held, climb) * n_W, rose_for);
+  if (held <= 0.0) return;
+  GroundRows z;
+  z.count = 1;
+  z.H.block<1, 3>(0, ground_column(err::nu)) = predicted.H_velocity;
+  z.H.block<1, 2>(0, ground_column(err::normal)) = predicted.H_normal;
+  z.residual(0) = held;
+  z.sigma(0) = ground_.climb_sigma();
+  ekf.apply(z, 1.0, CameraUpdate::considered);
 }
 
 void Sources::look_at(const FeatureFrame& frame, TimeNs t_ns, const Ingest& ingest, Ekf& ekf) {

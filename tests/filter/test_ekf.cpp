@@ -272,19 +272,24 @@ TEST_CASE("ekf: inflated motion is about the body, inflated biases are each sens
   CHECK(after(err::b_a, err::b_a) == doctest::Approx(before(err::b_a, err::b_a) + 0.25));
 }
 
-TEST_CASE("ekf: what was held down is one error of velocity and position, along what it was held against") {
+TEST_CASE("ekf: what was held down is one error of velocity, position and the clones since") {
   Ekf ekf = started();
+  const ImuBuffer imu = samples();
+  for (const double t : {0.2, 0.5, 0.7, 0.8}) {
+    ekf.propagate(imu, kStart + static_cast<TimeNs>(std::llround(t * 1e9)), {}, 0.0);
+    if (t < 0.8) ekf.clone(1.0);
+  }
   const Eigen::MatrixXd before = ekf.covariance().matrix();
   const Eigen::Vector3d v_W(0.1, -0.2, 0.3);
-  const Eigen::Vector3d p_W = 0.25 * v_W;
-  ekf.inflate_along(v_W, p_W);
-  const Eigen::MatrixXd grown = ekf.covariance().matrix() - before;
-  CHECK(grown.block<3, 3>(err::nu, err::nu).isApprox(v_W * v_W.transpose(), 1e-12));
-  CHECK(grown.block<3, 3>(err::rho, err::rho).isApprox(p_W * p_W.transpose(), 1e-12));
-  CHECK(grown.block<3, 3>(err::rho, err::nu).isApprox(p_W * v_W.transpose(), 1e-12));
-  CHECK(grown.block<3, 3>(err::nu, err::rho).isApprox(v_W * p_W.transpose(), 1e-12));
-  CHECK(grown.topRows<3>().norm() == 0.0);
-  CHECK(grown.bottomRows(grown.rows() - err::b_g).norm() == 0.0);
+  const Eigen::Vector3d p_W = 0.2 * v_W;  // by a force that is constant for 0.4 s
+  ekf.inflate_held(v_W, p_W, 0.4);
+  // At 0.2 s nothing held yet; at 0.5 and 0.7 s it had for a quarter of the time, and for three.
+  Eigen::VectorXd J = Eigen::VectorXd::Zero(before.rows());
+  J.segment<3>(err::nu) = v_W;
+  J.segment<3>(err::rho) = p_W;
+  J.segment<3>(err::clone(1) + 3) = p_W / 16.0;
+  J.segment<3>(err::clone(2) + 3) = p_W * 9.0 / 16.0;
+  CHECK((ekf.covariance().matrix() - before - J * J.transpose()).norm() < 1e-9);
 }
 
 TEST_CASE("ekf: an unknown time is one error of turn and velocity, and one of the place, along what the state does") {
@@ -345,7 +350,7 @@ TEST_CASE("ekf: what updates did to the biases is given once") {
   CHECK(changes.correction(1) == doctest::Approx(ekf.state().imu.b_g.y()));
   CHECK(changes.variance_lowered(1) == doctest::Approx(0.01 - ekf.covariance().matrix()(10, 10)));
   CHECK(ekf.take_bias_changes().correction.isZero());
-  ekf.discard_bias_changes();
+  ekf.inflate_held(Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(), 0.1);
   CHECK(ekf.take_bias_changes().restarted);
 }
 

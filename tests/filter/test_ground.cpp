@@ -121,6 +121,15 @@ TEST_CASE("ground: slopes of hand-made grounds") {
   CHECK(higher_on_the_left.across == doctest::Approx(hill));
 }
 
+TEST_CASE("ground: a vehicle that leaves a ramp straight ahead does not climb, one that rises does") {
+  State x;
+  x.ground.n_W = Eigen::Vector3d(-std::sin(0.2), 0.0, std::cos(0.2));  // uphill ahead
+  x.imu.v_W = {std::cos(0.2), 0.0, std::sin(0.2)};
+  CHECK(std::abs(predict_climb(x).speed) < 1e-12);
+  x.imu.v_W += 0.3 * x.ground.n_W;
+  CHECK(predict_climb(x).speed == doctest::Approx(0.3));
+}
+
 TEST_CASE("ground: Jacobians are the derivatives") {
   std::mt19937_64 rng{62};
   for (int i = 0; i < 5; ++i) {
@@ -166,5 +175,15 @@ TEST_CASE("ground: Jacobians are the derivatives") {
       return Eigen::Vector2d(s.along, s.across);
     };
     check_jacobian(slopes, slope(x.imu.R_WB * y_B, x.ground.n_W).J);
+
+    const auto climb = [&](const Eigen::VectorXd& part) -> Eigen::VectorXd {
+      Eigen::VectorXd d = Eigen::VectorXd::Zero(x.error_size());
+      d.head(part.size()) = part;
+      return Eigen::VectorXd::Constant(1, predict_climb(with_error(x, d)).speed);
+    };
+    Eigen::MatrixXd H_climb = Eigen::MatrixXd::Zero(1, err::normal + 2);
+    H_climb.middleCols<2>(err::normal) = predict_climb(x).H_normal;
+    H_climb.middleCols<3>(err::nu) = predict_climb(x).H_velocity;
+    check_jacobian(climb, H_climb);
   }
 }

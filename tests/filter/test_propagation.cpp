@@ -136,6 +136,15 @@ TEST_CASE("propagation: what the accelerometer's matrix does is the derivative")
   }
 }
 
+TEST_CASE("propagation: the state that users get needs no matrix where gravity is all that is felt") {
+  std::mt19937_64 rng{16};
+  const ImuState x = random_state(rng, 0).imu;
+  const Eigen::Vector3d rest_B = -(x.R_WB.transpose() * kGravity_W);
+  const Eigen::Vector3d accel_B = x.b_a + x.accel_matrix.inverse() * rest_B;
+  REQUIRE((accel_B - x.b_a - rest_B).norm() > 0.01);
+  CHECK((accel_B - nav_state(x).b_a - rest_B).norm() < 1e-12);
+}
+
 TEST_CASE("propagation: Q is the covariance of many noisy integrations") {
   std::mt19937_64 rng{12};
   std::normal_distribution<double> normal;

@@ -85,4 +85,9 @@ LeanPrediction predict_lean(const State& x, const Eigen::Matrix3d& R_WB, Odomete
   return {axis_B * n_B, axis_B * normal_by_error(x, R_WB, n_B), -n_B.transpose() * R_BO * skew(axis_O)};
 }
 
+ClimbPrediction predict_climb(const State& x) {
+  const Eigen::Vector3d &n_W = x.ground.n_W, &v_W = x.imu.v_W;
+  return {n_W.dot(v_W), n_W.cross(v_W).transpose() * tangent_basis(n_W), n_W.transpose()};
+}
+
 }  // namespace ear

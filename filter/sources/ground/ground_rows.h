@@ -60,4 +60,14 @@ enum class OdometerAxis : std::uint8_t { forward, left };  ///< `left` is that o
 
 [[nodiscard]] LeanPrediction predict_lean(const State& x, const Eigen::Matrix3d& R_WB, OdometerAxis axis);
 
+/// How fast the vehicle rises off the ground, linearized: climb = speed + H_normal delta + H_velocity nu,
+/// speed = n . v. The attitude does not appear: errors of n and v are counted from it.
+struct ClimbPrediction {
+  double speed = 0.0;  ///< [m/s]
+  Eigen::RowVector2d H_normal = Eigen::RowVector2d::Zero();
+  Eigen::RowVector3d H_velocity = Eigen::RowVector3d::Zero();
+};
+
+[[nodiscard]] ClimbPrediction predict_climb(const State& x);
+
 }  // namespace ear

@@ -31,6 +31,8 @@ GroundTracker::GroundTracker(const LaserCalibration& lasers, const EncoderCalibr
 
 double GroundTracker::height_sigma() const { return std::sqrt(P_(kHeight, kHeight)); }
 
+double GroundTracker::climb_sigma() const { return std::sqrt(P_(kClimb, kClimb)); }
+
 void GroundTracker::turn(const Eigen::Vector3d& angle_B, const Eigen::Vector3d& accel_B, double dt) {
   const Eigen::Matrix3d R = exp_so3(-angle_B);
   x_.head<3>() = R * x_.head<3>();

@@ -48,6 +48,7 @@ class GroundTracker {
   [[nodiscard]] double height() const { return x_(kHeight); }  ///< of the wheels above the plane [m]
   [[nodiscard]] double height_sigma() const;                   ///< [m]
   [[nodiscard]] double climb() const { return x_(kClimb); }    ///< [m/s]
+  [[nodiscard]] double climb_sigma() const;                    ///< [m/s]
   [[nodiscard]] Eigen::Vector3d n_B() const { return x_.head<3>(); }
 
  private:
