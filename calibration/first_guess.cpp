@@ -44,12 +44,6 @@ FeatureFrame through(const Calibration& given, const Calibration& now, FeatureFr
   return frame;
 }
 
-/// As the batch takes it to be: what the filter would learn of its matrix the batch had to find in the biases.
-Calibration with_exact_accelerometer(Calibration calibration) {
-  calibration.imu.accel_scale_sigma = 1e-9;
-  return calibration;
-}
-
 /// Feeds the samples in the order of time, a frame after the first inertial sample that is later.
 class Feed {
  public:
@@ -58,7 +52,7 @@ class Feed {
       : drive_(drive),
         given_(given),
         now_(now),
-        filter_(config, with_exact_accelerometer(now)),
+        filter_(config, now),
         interval_ns_(static_cast<TimeNs>(std::llround(1e9 * interval))),
         encoder_offset_(now.encoder ? now.encoder->time_offset : 0.0),
         laser_offset_(now.lasers ? now.lasers->time_offset : 0.0) {}
@@ -140,8 +134,14 @@ std::vector<GuessedState> longest_piece(const Drive& drive, const Calibration& g
 
 }  // namespace
 
-FirstGuess guess_motion(const Drive& drive, const Calibration& given, const Calibration& now,
-                        const FilterConfig& config, double interval) {
+/// With the accelerometer exact, as the batch takes it to be: what the filter learned of its matrix the batch would
+/// have to find in the biases.
+FirstGuess guess_motion(const Drive& drive, const Calibration& given, const Calibration& guessed,
+                        const FilterConfig& shipped, double interval) {
+  Calibration now = guessed;
+  FilterConfig config = shipped;
+  now.imu.accel_scale_sigma.reset();
+  config.prior.accel_scale = 0.0;
   const double duration = seconds_between(drive.imu.front().t_ns, drive.imu.back().t_ns);
   FilterConfig cameras = config;
   if (!given.cameras.empty()) cameras.odometer.model = OdometerModel::none;

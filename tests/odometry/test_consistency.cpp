@@ -84,7 +84,7 @@ FilterConfig simulated_noise(const Case& setup, const simulator::Options& option
   // The simulator draws no errors of these.
   config.online_calibration.axle = config.online_calibration.beam_offset = config.online_calibration.intrinsics = false;
   config.online_calibration.encoder_time_offset = false;
-  config.prior.gyro_scale = 1e-6;
+  config.prior.gyro_scale = config.prior.accel_scale = 1e-6;
   config.odometer.scores = config.anomaly.enabled = false;  // the noise is known: nothing is inflated
   // The priors are the distribution that the simulator draws from: a fixed size in a random direction, per axis.
   config.prior.accel_bias = 0.03;
