@@ -74,65 +74,53 @@ TEST_CASE("propagation: Phi is the derivative, biases included") {
   }
 }
 
-TEST_CASE("propagation: what the gyroscope's matrix does is the derivative") {
+TEST_CASE("propagation: what the inertial sensors' matrices do is the derivative") {
   std::mt19937_64 rng{14};
+  const auto with = [](const Eigen::VectorXd& E) -> Eigen::Matrix3d {
+    return Eigen::Matrix3d::Identity() + Eigen::Matrix3d(E.reshaped(3, 3));
+  };
   for (int trial = 0; trial < 20; ++trial) {
     CAPTURE(trial);
     const ImuState start = random_state(rng, 0).imu;
     const double dt = 0.01;
-    GyroEffect effect = GyroEffect::Zero();
+    MatrixEffect effect;
     ImuState end = start;
     std::vector<Eigen::Vector3d> gyro, accel;
     for (std::size_t i = 0; i < 5; ++i) {
       gyro.push_back(random_vector(rng, 1.0));
       accel.emplace_back(random_vector(rng, 5.0) - kGravity_W);
-      chain(effect, error_transition(end, gyro[i], accel[i], dt, ImuCalibration{}), gyro[i] - end.b_g);
+      const ErrorTransition step = error_transition(end, gyro[i], accel[i], dt, ImuCalibration{});
+      chain(effect.gyro, step, gyro[i] - end.b_g);
+      chain(effect.accel, step, accel[i] - end.b_a);
       end = integrate(end, gyro[i], accel[i], dt);
     }
-    const auto with_matrix = [&](const Eigen::VectorXd& E) {
+    const auto reached = [&](const Eigen::Matrix3d& by_gyro, const Eigen::Matrix3d& by_accel) {
       ImuState x = start;
-      x.gyro_matrix *= Eigen::Matrix3d::Identity() + Eigen::Matrix3d(E.reshaped(3, 3));
+      x.gyro_matrix *= by_gyro;
+      x.accel_matrix *= by_accel;
       for (std::size_t i = 0; i < gyro.size(); ++i) x = integrate(x, gyro[i], accel[i], dt);
       return x;
     };
-    check_jacobian(
-        [&](const Eigen::VectorXd& E) -> Eigen::VectorXd { return imu_difference(with_matrix(E), end).head<9>(); },
-        effect);
-    leave_out_heading(effect, end);
+    const Eigen::Matrix3d exact = Eigen::Matrix3d::Identity();
     check_jacobian(
         [&](const Eigen::VectorXd& E) -> Eigen::VectorXd {
-          ImuState x = with_matrix(E);
+          return imu_difference(reached(with(E), exact), end).head<9>();
+        },
+        effect.gyro);
+    check_jacobian(
+        [&](const Eigen::VectorXd& E) -> Eigen::VectorXd {
+          return imu_difference(reached(exact, with(E)), end).segment<6>(err::nu);
+        },
+        effect.accel);
+    leave_out_heading(effect.gyro, end);
+    check_jacobian(
+        [&](const Eigen::VectorXd& E) -> Eigen::VectorXd {
+          ImuState x = reached(with(E), exact);
           const double turn = imu_difference(x, end)(err::theta + 2);
           x.R_WB = exp_so3({0.0, 0.0, -turn}) * x.R_WB;
           return imu_difference(x, end).head<9>();
         },
-        effect);
-  }
-}
-
-TEST_CASE("propagation: what the accelerometer's matrix does is the derivative") {
-  std::mt19937_64 rng{15};
-  for (int trial = 0; trial < 20; ++trial) {
-    CAPTURE(trial);
-    const ImuState start = random_state(rng, 0).imu;
-    const double dt = 0.01;
-    AccelEffect effect = AccelEffect::Zero();
-    ImuState end = start;
-    std::vector<Eigen::Vector3d> gyro, accel;
-    for (std::size_t i = 0; i < 5; ++i) {
-      gyro.push_back(random_vector(rng, 1.0));
-      accel.emplace_back(random_vector(rng, 5.0) - kGravity_W);
-      chain(effect, error_transition(end, gyro[i], accel[i], dt, ImuCalibration{}), accel[i] - end.b_a);
-      end = integrate(end, gyro[i], accel[i], dt);
-    }
-    check_jacobian(
-        [&](const Eigen::VectorXd& E) -> Eigen::VectorXd {
-          ImuState x = start;
-          x.accel_matrix *= Eigen::Matrix3d::Identity() + Eigen::Matrix3d(E.reshaped(3, 3));
-          for (std::size_t i = 0; i < gyro.size(); ++i) x = integrate(x, gyro[i], accel[i], dt);
-          return imu_difference(x, end).segment<6>(err::nu);
-        },
-        effect);
+        effect.gyro);
   }
 }
 
