@@ -134,12 +134,8 @@ std::vector<GuessedState> longest_piece(const Drive& drive, const Calibration& g
 
 }  // namespace
 
-/// With the accelerometer exact, as the batch takes it to be: what the filter learned of its matrix the batch would
-/// have to find in the biases.
-FirstGuess guess_motion(const Drive& drive, const Calibration& given, const Calibration& guessed,
-                        const FilterConfig& shipped, double interval) {
-  Calibration now = guessed;
-  FilterConfig config = shipped;
+FirstGuess guess_motion(const Drive& drive, const Calibration& given, Calibration now, FilterConfig config,
+                        double interval) {
   now.imu.accel_scale_sigma.reset();
   config.prior.accel_scale = 0.0;
   const double duration = seconds_between(drive.imu.front().t_ns, drive.imu.back().t_ns);

@@ -24,9 +24,10 @@ struct FirstGuess {
 
 /// `given`: whose lens the features were seen through; `now`: the calibration at hand, its standard deviations stated.
 /// From the cameras alone where there are any, for wheels and beams that are not yet calibrated would mislead it.
-/// States are `interval` seconds apart. Throws std::invalid_argument, naming the drive, where hardly anything is
-/// estimated.
-[[nodiscard]] FirstGuess guess_motion(const Drive& drive, const Calibration& given, const Calibration& now,
-                                      const FilterConfig& config, double interval);
+/// The accelerometer is exact, as the batch takes it to be: what the filter learned of its matrix the batch would have
+/// to find in the biases. States are `interval` seconds apart. Throws std::invalid_argument, naming the drive, where
+/// hardly anything is estimated.
+[[nodiscard]] FirstGuess guess_motion(const Drive& drive, const Calibration& given, Calibration now,
+                                      FilterConfig config, double interval);
 
 }  // namespace ear::calibration

@@ -61,13 +61,9 @@ void Filter::propagate_to(const FeatureFrame& frame) {
 /// well known by what was observed. By wheels alone it looks the same as a wheel that slips.
 void Filter::watch_biases() {
   const bool by_wheels_alone = sources_.uses_wheels() && !sources_.cameras().show_motion(ekf_.state());
-  BiasChanges changes = ekf_.take_bias_changes();
-  if (by_wheels_alone) {
-    changes = BiasChanges{};
-    changes.restarted = true;
-  }
+  const BiasChanges changes = ekf_.take_bias_changes();
   const TimeNs t_ns = ekf_.state().imu.t_ns;
-  const BiasJump jump = bias_watch_.judge(changes, t_ns);
+  const BiasJump jump = bias_watch_.judge(by_wheels_alone ? BiasChanges::discarded() : changes, t_ns);
   if (!jump.any()) return;
   ekf_.inflate_motion(jump.gyro * kStale, jump.accel * kStale, 0.5 * jump.accel * kStale * kStale);
   ekf_.inflate(err::b_g, bias_sigma(jump.gyro, jump.accel));

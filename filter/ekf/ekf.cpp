@@ -72,7 +72,7 @@ void Ekf::start(const ImuState& x, const Eigen::VectorXd& sigma, bool scale_is_g
   started_ns_ = x.t_ns;
   started_W_ = x.p_WB;
   last_ = {};
-  last_.mean_force_B = -(x.R_WB.transpose() * kGravity_W);
+  last_.mean_force_B = x.rest_force_B();
   turned_ = 0.0;
   turned_path_.setZero();
   covariance_.reset(sigma);
@@ -215,8 +215,7 @@ void Ekf::inflate_held(const Eigen::Vector3d& v_W, const Eigen::Vector3d& p_W, d
     if (share > 0.0) J.segment<3>(err::clone(static_cast<int>(i)) + 3) = share * share * p_W;
   }
   covariance_.inflate_along(J);
-  bias_changes_ = BiasChanges{};
-  bias_changes_.restarted = true;
+  bias_changes_ = BiasChanges::discarded();
 }
 
 /// One unknown for turn and velocity, along what the state does. How far the vehicle came has its own: it is known by

@@ -52,7 +52,7 @@ Eigen::Matrix3d gyro_rotation(TimeNs from_ns, TimeNs to_ns, const Eigen::Vector3
 
 /// With the matrix taken for the identity, the bias that makes of gravity what the matrix makes of it.
 NavState nav_state(const ImuState& x) {
-  const Eigen::Vector3d rest_B = -(x.R_WB.transpose() * kGravity_W);
+  const Eigen::Vector3d rest_B = x.rest_force_B();
   const Eigen::Vector3d more_B = x.accel_matrix.inverse() * rest_B - rest_B;
   return {x.t_ns, Eigen::Quaterniond(x.R_WB).normalized(), x.p_WB, x.v_W, x.b_g, x.b_a + more_B};
 }

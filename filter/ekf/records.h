@@ -64,6 +64,12 @@ struct BiasChanges {
   Vector6 variance_lowered = Vector6::Zero();
   bool restarted = false;  ///< what came before does not count
 
+  /// Of updates that were misled by another source.
+  [[nodiscard]] static BiasChanges discarded() {
+    BiasChanges changes;
+    changes.restarted = true;
+    return changes;
+  }
   void add(const Vector6& more_correction, const Vector6& more_lowered) {
     correction += more_correction;
     variance_lowered += more_lowered.cwiseMax(0.0);

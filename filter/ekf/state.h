@@ -72,10 +72,9 @@ struct ImuState {
   Eigen::Vector3d p_WB = Eigen::Vector3d::Zero();
   Eigen::Vector3d b_g = Eigen::Vector3d::Zero();
   Eigen::Vector3d b_a = Eigen::Vector3d::Zero();
-  /// M, true = M measured rate: scales of the axes, and where they point against those of the accelerometer, which are
-  /// the body's.
+  /// M, true = M measured rate: scales of the axes, and where they point.
   Eigen::Matrix3d gyro_matrix = Eigen::Matrix3d::Identity();
-  /// A, true = A measured specific force.
+  /// A, true = A measured specific force, likewise.
   Eigen::Matrix3d accel_matrix = Eigen::Matrix3d::Identity();
 
   [[nodiscard]] Pose T_WB() const { return {R_WB, p_WB}; }
@@ -83,6 +82,8 @@ struct ImuState {
   [[nodiscard]] Eigen::Vector3d rate_B(const Eigen::Vector3d& gyro_B) const { return gyro_matrix * (gyro_B - b_g); }
   /// The body's specific force where the accelerometer measures `accel_B` [m/s^2].
   [[nodiscard]] Eigen::Vector3d force_B(const Eigen::Vector3d& accel_B) const { return accel_matrix * (accel_B - b_a); }
+  /// That of a body at rest: what bears it against gravity.
+  [[nodiscard]] Eigen::Vector3d rest_force_B() const { return -(R_WB.transpose() * kGravity_W); }
 };
 
 /// The plane that the wheels stand on.

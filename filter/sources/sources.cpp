@@ -40,11 +40,12 @@ Sources::Sources(const FilterConfig& config, const Calibration& calibration)
 /// off, and position and clones by what that came to. Then the beams' climb is measured.
 void Sources::inflate_after_takeoff(Ekf& ekf) const {
   ekf.inflate_motion(0.0, kTakeoffVelocity, kTakeoffVelocity * kSilent);  // for so long unnoticed
+  const GroundTracker& plane = *ground_.plane();                          // without beams nothing takes off
   const Eigen::Vector3d n_W = ekf.state().ground.n_W;
   const ClimbPrediction predicted = predict_climb(ekf.state());
-  const double climb = ground_.climb();
+  const double climb = plane.climb();
   const double held = climb > 0.0 ? std::max(0.0, climb - predicted.speed) : 0.0;
-  const double rose_for = climb > 0.0 ? 2.0 * std::max(0.0, ground_.height()) / climb : 0.0;  // by a constant force
+  const double rose_for = climb > 0.0 ? 2.0 * std::max(0.0, plane.height()) / climb : 0.0;  // by a constant force
   ekf.inflate_held(held * n_W, 0.5 * rose_for * std::min(held, climb) * n_W, rose_for);
   if (held <= 0.0) return;
   GroundRows z;
@@ -52,7 +53,7 @@ void Sources::inflate_after_takeoff(Ekf& ekf) const {
   z.H.block<1, 3>(0, ground_column(err::nu)) = predicted.H_velocity;
   z.H.block<1, 2>(0, ground_column(err::normal)) = predicted.H_normal;
   z.residual(0) = held;
-  z.sigma(0) = ground_.climb_sigma();
+  z.sigma(0) = plane.climb_sigma();
   ekf.apply(z, 1.0, CameraUpdate::considered);
 }
 

@@ -19,6 +19,13 @@ constexpr double kGravityTolerance = 1.5;  // [m/s^2] chosen: of the specific fo
 constexpr double kUnknownTilt = 0.3;       // [rad] chosen: before gravity was measured
 constexpr double kUnitTolerance = 1e-3;    // chosen: of the length of a quaternion: digits that were cut off
 
+/// Where the force `force_B` is felt, errors E of the accelerometer's matrix measure as the bias -E force.
+Eigen::Matrix<double, 3, 9> bias_by_matrix(const Eigen::Vector3d& force_B) {
+  Eigen::Matrix<double, 3, 9> J;
+  for (int axis = 0; axis < 3; ++axis) J.middleCols<3>(3 * axis) = -force_B(axis) * Eigen::Matrix3d::Identity();
+  return J;
+}
+
 }  // namespace
 
 GivenStart checked(const GivenStart& given) {
@@ -158,7 +165,7 @@ std::optional<StartState> Start::standing(TimeNs t_ns, const ImuStatistics& imu)
   x.b_g = imu.gyro_mean;
   start.sigma = sigma();
   // What the force measures beyond gravity's known size can only be bias.
-  const Eigen::Vector3d gravity_B = -(x.R_WB.transpose() * kGravity_W);
+  const Eigen::Vector3d gravity_B = x.rest_force_B();
 
   // force = (I - E) R^T (-g) + b_a + n, rate = b_g + n; with the invariant error, R^T u = R^^T (u + [u]x theta).
   const double root_duration = std::sqrt(imu.duration);
@@ -170,9 +177,7 @@ std::optional<StartState> Start::standing(TimeNs t_ns, const ImuStatistics& imu)
   start.residual.setZero(6);  // that of the rate stays
   start.H.block<3, 3>(0, err::theta) = x.R_WB.transpose() * skew(-kGravity_W) / accel_sigma;
   start.H.block<3, 3>(0, err::b_a) = Eigen::Matrix3d::Identity() / accel_sigma;
-  for (int axis = 0; axis < 3; ++axis) {
-    start.H.block<3, 3>(0, err::accel_matrix + 3 * axis) = -gravity_B(axis) * Eigen::Matrix3d::Identity() / accel_sigma;
-  }
+  start.H.block<3, 9>(0, err::accel_matrix) = bias_by_matrix(gravity_B) / accel_sigma;
   start.residual.head<3>() = (imu.accel_mean - gravity_B) / accel_sigma;
   start.H.block<3, 3>(3, err::b_g) = Eigen::Matrix3d::Identity() / gyro_sigma;
   return start;
@@ -194,10 +199,7 @@ StartState Start::in_motion(const StartAttempt& attempt) const {
   J.block<3, 3>(StartFit::gravity, err::theta) = R_BW * skew(kGravity_W);
   J.block<3, 3>(StartFit::gyro_bias, err::b_g).setIdentity();
   J.block<3, 3>(StartFit::accel_bias, err::b_a).setIdentity();
-  const Eigen::Vector3d gravity_B = -(R_BW * kGravity_W);
-  for (int axis = 0; axis < 3; ++axis) {
-    J.block<3, 3>(StartFit::accel_bias, err::accel_matrix + 3 * axis) = -gravity_B(axis) * Eigen::Matrix3d::Identity();
-  }
+  J.block<3, 9>(StartFit::accel_bias, err::accel_matrix) = bias_by_matrix(start.x.rest_force_B());
   start.H = attempt.information->llt().matrixU() * J / kWorstFit;
   start.residual.setZero(StartFit::motion_size);
   start.imu_noise = attempt.imu_noise;

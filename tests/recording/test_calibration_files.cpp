@@ -320,8 +320,8 @@ TEST_CASE("calibration: standard deviations beside the values") {
          "T_C0C1_sigma: {rotation: 0.0003, position: 0.00005}\n"
          "intrinsics_sigma: {focal_length: 0.4, principal_point: 0.2}\n");
   append("imu0",
-         "gyroscope_bias_sigma: 0.01\naccelerometer_bias_sigma: 0.2\ngyroscope_scale_sigma: "
-         "0.01\naccelerometer_scale_sigma: 0.02\n");
+         "gyroscope_bias_sigma: 0.01\naccelerometer_bias_sigma: 0.2\n"
+         "gyroscope_scale_sigma: 0.01\naccelerometer_scale_sigma: 0.02\n");
   append("encoder0",
          "T_BS_sigma: {rotation: 0.004, position: 0.003}\nwheel_radius_sigma: 0.0003\n"
          "wheel_radius_difference_sigma: 0.0001\nwheel_separation_sigma: 0.002\nstamp_sigma: 0.004\n");

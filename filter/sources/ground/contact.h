@@ -44,11 +44,8 @@ class ContactDetector {
   [[nodiscard]] ContactMode mode() const { return mode_; }
   /// When the wheels last left the ground or met it; nothing if that was not seen.
   [[nodiscard]] std::optional<TimeNs> since_ns() const { return since_ns_; }
-  /// Of the wheels over the plane that the beams track: how fast it grows, and to which standard deviation
-  /// [m/s], and how much it is [m]; 0 without beams.
-  [[nodiscard]] double climb() const { return ground_ ? ground_->climb() : 0.0; }
-  [[nodiscard]] double climb_sigma() const { return ground_ ? ground_->climb_sigma() : 0.0; }
-  [[nodiscard]] double height() const { return ground_ ? ground_->height() : 0.0; }
+  /// The plane that the beams see; nothing without wheels or beams.
+  [[nodiscard]] const std::optional<GroundTracker>& plane() const { return ground_; }
   /// Of which beams this is true: BeamRepeats::repeats, BeamRepeats::stuck.
   [[nodiscard]] std::bitset<kMaxBeams> beams_that(BeamRepeats::Property property) const {
     return ground_ ? ground_->beams_that(property) : std::bitset<kMaxBeams>{};

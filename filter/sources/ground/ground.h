@@ -36,11 +36,8 @@ class Ground {
   [[nodiscard]] bool flies_at(TimeNs t_ns) const { return contact_.mode() != ContactMode::unknown && !rolls_at(t_ns); }
   /// Have the lasers seen the ground since it was last touched?
   [[nodiscard]] bool known() const { return running_.known; }
-  /// Of the wheels over the plane that the beams track: how fast it grows, and to which standard deviation
-  /// [m/s], and how much it is [m]; 0 without beams.
-  [[nodiscard]] double climb() const { return contact_.climb(); }
-  [[nodiscard]] double climb_sigma() const { return contact_.climb_sigma(); }
-  [[nodiscard]] double height() const { return contact_.height(); }
+  /// The plane that the beams see; nothing without wheels or beams.
+  [[nodiscard]] const std::optional<GroundTracker>& plane() const { return contact_.plane(); }
   /// Of which beams this is true: BeamRepeats::repeats, BeamRepeats::stuck.
   [[nodiscard]] std::bitset<kMaxBeams> beams_that(BeamRepeats::Property property) const {
     return contact_.beams_that(property);
