@@ -7,6 +7,7 @@
 
 #include "filter/ekf/initial_state.h"
 #include "filter/ekf/propagation.h"
+#include "filter/ekf/so3.h"
 #include "filter/ingest/limits.h"
 #include "filter/sources/ground/ground_rows.h"
 
@@ -20,6 +21,18 @@ RelativeMotion motion_between(const Pose& T_WB0, const NavState& next) {
   motion.p_B0B1 = T_WB0.R.transpose() * (next.p_WB - T_WB0.p);
   motion.rotation_known = motion.translation_known = true;
   return motion;
+}
+
+/// Do cameras or wheels point elsewhere in the body than the calibration says and its standard deviations allow?
+bool mounting_refuted(const PriorConfig& prior, const Calibration& given, const Ekf& ekf) {
+  if (!ekf.running()) return false;
+  const auto refuted = [](const Eigen::Matrix3d& turn, double sigma) {
+    return log_so3(turn).lpNorm<Eigen::Infinity>() > kClear * sigma;
+  };
+  const State& x = ekf.state();
+  return refuted(x.camera.T_BC0.R * camera_state(given).T_BC0.R.transpose(), prior.camera_rotation) ||
+         refuted(odometer_state(given).T_BO.R.transpose() * x.odometer.T_BO.R,
+                 has_beams(given) ? prior.odometer_rotation : prior.odometer_unseen);
 }
 
 }  // namespace
@@ -183,7 +196,8 @@ HealthMonitor::Frame CommonEstimator::health_frame(bool image, const FrameAgreem
   frame.waits_for = start_.waits_for();
   frame.agreement = seen;
   frame.statistics = records_.statistics;
-  frame.misaligned = sources_.wheels() && sources_.wheels()->misaligned();
+  frame.misaligned =
+      (sources_.wheels() && sources_.wheels()->misaligned()) || mounting_refuted(config_.prior, calibration_, ekf_);
   frame.lifted = sources_.wheels() && sources_.wheels()->lifting(frame.t_ns);
   if (!estimate) return frame;
   frame.possible = ekf_.possible();

@@ -98,8 +98,7 @@ std::string to_text(const Health& health) {
     text += separator + std::string("position imprecise");
     separator = ", ";
   }
-  if (health.misaligned)
-    text += separator + std::string("wheels and inertial sensors disagree about where forward or left is");
+  if (health.misaligned) text += separator + std::string("sensors point elsewhere than the calibration says");
   return text + "; carried by " + to_text(health.aiding);
 }
 

@@ -287,7 +287,7 @@ typedef struct {
   uint8_t reset_counter;              /* grows when the pose goes on with a jump: after lost */
   int32_t load_step;                  /* how much work is left out to keep ear_settings.budget_ms; 0: none */
   int32_t imprecise;  /* 1: two standard deviations of the position are more than 5 % of the path and 0.1 m */
-  int32_t misaligned; /* 1: wheels and inertial sensors disagree about where forward or left is */
+  int32_t misaligned; /* 1: sensors point elsewhere in the body than the calibration allows */
   double score[EAR_SOURCE_COUNT]; /* of each source, in (0, 1]: its noise was divided by this; ear/health.h */
 } ear_health;
 

@@ -95,7 +95,7 @@ struct Health {
   SourceSet faulty;                  ///< sources that the estimate should rest on, and does not
   std::array<TimeNs, kSourceCount> onset_ns{};  ///< of these: since when
   bool imprecise = false;          ///< two standard deviations of the position are more than 5 % of the path and 0.1 m
-  bool misaligned = false;         ///< wheels and inertial sensors disagree about where forward or left is
+  bool misaligned = false;         ///< sensors point elsewhere in the body than the calibration allows
   Aiding aiding = Aiding::none;    ///< what is left
   int quality = 0;                 ///< 0 (lost) ... 100
   double horizontal_sigma = 0.0;   ///< [m] standard deviation of the position since the start, in the worst direction

@@ -254,6 +254,9 @@ def begin_late(copy):
 
 LEANING = [[1.0, 0.01, 0.01], [0.01, 1.0, 0.01], [0.01, 0.01, 1.0]]
 QUARTER_TURN = [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
+COS_5, SIN_5 = math.cos(math.radians(5.0)), math.sin(math.radians(5.0))
+YAWED = [[COS_5, SIN_5, 0.0], [-SIN_5, COS_5, 0.0], [0.0, 0.0, 1.0]]
+PITCHED = [[COS_5, 0.0, SIN_5], [0.0, 1.0, 0.0], [-SIN_5, 0.0, COS_5]]
 
 
 @dataclass(frozen=True)
@@ -296,6 +299,8 @@ ALTERATIONS = [
                on(["imu0"], each_value((4, 5), lambda x, column: x + (0.7 if column == 4 else -0.7)))),
     Alteration("imu_turned", "inertial sensors turned by 90 degrees about the vertical; so the mower's are right",
                on(["imu0"], through_matrix(QUARTER_TURN, (GYRO, ACCEL)))),
+    Alteration("imu_yawed", "inertial sensors turned by 5 degrees about the vertical", on(["imu0"], through_matrix(YAWED, (GYRO, ACCEL)))),
+    Alteration("imu_pitched", "inertial sensors turned by 5 degrees about the left", on(["imu0"], through_matrix(PITCHED, (GYRO, ACCEL)))),
     Alteration("gyro_degrees", "gyroscope in degrees per second", on(["imu0"], each_value(GYRO, lambda x, _: 57.29578 * x))),
     Alteration("accel_g", "accelerometer in g", on(["imu0"], each_value(ACCEL, lambda x, _: x / 9.80665))),
     Alteration("gyro_sign", "the yaw rate has the wrong sign", on(["imu0"], each_value((3,), lambda x, _: -x))),
