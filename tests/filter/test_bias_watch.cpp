@@ -5,7 +5,10 @@
 #include <cmath>
 #include <random>
 
+#include "tests/support/about.h"
+
 using namespace ear;
+using ear::test::about;
 using Vector6 = BiasChanges::Vector6;
 
 namespace {
@@ -87,7 +90,7 @@ TEST_CASE("bias_watch: a jump of either sensor is found within half a second, by
     CHECK(frames * kDt < 0.5);
     CHECK(now.fault.accel == accel);
     CHECK(now.fault.gyro != accel);
-    CHECK(size(accel ? 4 : 1) == doctest::Approx(0.5).epsilon(0.3));
+    CHECK(size(accel ? 4 : 1) == about(0.5, 0.3));
     CHECK(size(accel ? 1 : 4) < 0.2);  // what nothing shows yet of the other
   }
 }
@@ -121,8 +124,7 @@ TEST_CASE("bias_watch: what was found is not found again") {
   BiasWatch watch;
   Vector6 correction = Vector6::Zero();
   correction(0) = 0.1;
-  CHECK(watch.judge(changes_by(correction, Vector6::Constant(1e-4)), kStep).size(0) ==
-        doctest::Approx(0.1).epsilon(0.02));
+  CHECK(watch.judge(changes_by(correction, Vector6::Constant(1e-4)), kStep).size(0) == about(0.1, 0.02));
   CHECK_FALSE(any(watch.judge(BiasChanges{}, 2 * kStep)));
 }
 
