@@ -84,7 +84,6 @@ TEST_CASE("jumps: in flight a bias that jumps is inflated by as much") {
     for (const std::string fault : {"imu_bias_jump", "imu_bias_jump.accel", "imu_bias_jump.accel@20+5=0.05"}) {
       CAPTURE(fault);
       const Outcome outcome = run("fly1", fault, seed);
-      MESSAGE(fault, " ", outcome.ate / clean, " ", outcome.named, " ", outcome.lost, " ", outcome.false_tracking);
       CHECK(outcome.ate < 2.0 * clean);
       CHECK(outcome.named);
       CHECK(outcome.lost == 0.0);
