@@ -64,11 +64,10 @@ void Filter::watch_biases() {
   const BiasChanges changes = ekf_.take_bias_changes();
   const TimeNs t_ns = ekf_.state().imu.t_ns;
   const BiasJump jump = bias_watch_.judge(by_wheels_alone ? BiasChanges::discarded() : changes, t_ns);
+  if (!jump.any()) return;
+  ekf_.inflate_motion(jump.gyro * kStale, jump.accel * kStale, 0.5 * jump.accel * kStale * kStale);
+  ekf_.inflate(err::b_g, bias_sigma(jump.gyro, jump.accel));
   health_.report_imu_fault(jump.fault, t_ns);
-  if (jump.size.isZero()) return;
-  const double gyro = jump.size.head<3>().maxCoeff(), accel = jump.size.tail<3>().maxCoeff();
-  ekf_.inflate_motion(gyro * kStale, accel * kStale, 0.5 * accel * kStale * kStale);
-  ekf_.inflate(err::b_g, jump.size);
 }
 
 std::optional<Estimate> Filter::report(bool image, const FrameAgreement& seen) {

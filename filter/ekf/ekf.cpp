@@ -39,8 +39,6 @@ void correlate_baseline_and_lenses(const CameraState& cameras, const Eigen::Vect
   P.inflate(err::camera, added);
 }
 
-BiasChanges::Matrix6 bias_covariance(const Covariance& P) { return P.matrix().block<6, 6>(err::b_g, err::b_g); }
-
 /// Is the velocity much more than its error?
 bool moves(const ImuState& x, const Covariance& P) {
   const double variance = P.matrix().diagonal().segment<3>(err::nu).maxCoeff();
@@ -164,11 +162,12 @@ Eigen::Ref<const Eigen::VectorXd> Ekf::correction(const Eigen::Ref<const Eigen::
 void Ekf::apply(const Eigen::Ref<const Eigen::MatrixXd>& H, int first_column,
                 const Eigen::Ref<const Eigen::VectorXd>& r, CameraUpdate calibration) {
   const int considered = considered_from(calibration, calibration_, last_.turns, state_.imu, covariance_);
-  const BiasChanges::Matrix6 before = bias_covariance(covariance_);
+  const auto variance = [this] { return covariance_.matrix().diagonal().segment<6>(err::b_g); };
+  const BiasChanges::Vector6 before = variance();
   const Eigen::Ref<const Eigen::VectorXd> correction =
       covariance_.update(H, first_column, r, considered, err::clones - considered);
   if (!correction.allFinite()) return;  // the covariance shows it: possible()
-  bias_changes_.add(correction.segment<6>(err::b_g), before - bias_covariance(covariance_));
+  bias_changes_.add(correction.segment<6>(err::b_g), before - variance());
   boxplus(state_, correction);
 }
 
@@ -249,8 +248,7 @@ void Ekf::restart_reading(int index, double sigma) {
 }
 
 BiasChanges Ekf::take_bias_changes() {
-  BiasChanges changes = bias_changes_;
-  changes.left = bias_covariance(covariance_);
+  const BiasChanges changes = bias_changes_;
   bias_changes_ = BiasChanges{};
   return changes;
 }

@@ -56,20 +56,12 @@ class InnovationLog {
   std::array<SourceRecord, kSourceCount> records_{};
 };
 
-/// Standard deviations of both biases: gyroscope [rad/s], accelerometer [m/s^2], each axis.
-[[nodiscard]] inline Eigen::Matrix<double, 6, 1> bias_sigma(double gyro, double accel) {
-  return (Eigen::Matrix<double, 6, 1>() << Eigen::Vector3d::Constant(gyro), Eigen::Vector3d::Constant(accel))
-      .finished();
-}
-
-/// What updates did to the biases: the corrections, by how much they lowered the covariance, and what they left of it.
-/// Gyroscope [rad/s], then accelerometer [m/s^2].
+/// What updates did to the biases: the corrections, and by how much they lowered the variances. Gyroscope [rad/s], then
+/// accelerometer [m/s^2].
 struct BiasChanges {
   using Vector6 = Eigen::Matrix<double, 6, 1>;
-  using Matrix6 = Eigen::Matrix<double, 6, 6>;
   Vector6 correction = Vector6::Zero();
-  Matrix6 lowered = Matrix6::Zero();
-  Matrix6 left = Matrix6::Zero();
+  Vector6 variance_lowered = Vector6::Zero();
   bool restarted = false;  ///< what came before does not count
 
   /// Of updates that were misled by another source.
@@ -78,9 +70,9 @@ struct BiasChanges {
     changes.restarted = true;
     return changes;
   }
-  void add(const Vector6& more_correction, const Matrix6& more_lowered) {
+  void add(const Vector6& more_correction, const Vector6& more_lowered) {
     correction += more_correction;
-    lowered += more_lowered;
+    variance_lowered += more_lowered.cwiseMax(0.0);
   }
 };
 

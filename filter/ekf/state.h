@@ -152,6 +152,12 @@ struct State {
   [[nodiscard]] int error_size() const { return err::clone(static_cast<int>(clones.size())); }
 };
 
+/// Standard deviations of the errors from err::b_g on: gyroscope [rad/s], accelerometer [m/s^2], each axis.
+[[nodiscard]] inline Eigen::Matrix<double, 6, 1> bias_sigma(double gyro, double accel) {
+  return (Eigen::Matrix<double, 6, 1>() << Eigen::Vector3d::Constant(gyro), Eigen::Vector3d::Constant(accel))
+      .finished();
+}
+
 /// Two unit vectors, as columns, that span the plane perpendicular to the unit vector n; smooth except at n = -z.
 [[nodiscard]] Eigen::Matrix<double, 3, 2> tangent_basis(const Eigen::Vector3d& n);
 

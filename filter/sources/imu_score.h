@@ -30,15 +30,9 @@ class ImuScore {
   /// Not the gyroscope's: wheels would turn the vehicle instead, whose track width is a guess.
   void set_unseen_accel(double factor) { unseen_accel_ = factor; }
   /// The motion from the state to a frame at `t_ns` by the inertial samples, and as the images show it. `P`: of the
-  /// state's error. False if the images show too little.
-  bool add(const ImuMotion& motion, const StereoMotion& images, const Covariance& P, TimeNs t_ns);
-  /// By how much the cameras turned faster than the gyroscope of late [rad/s], in the mean, about the axis where it is
-  /// least likely. `P`: of the state's error.
-  [[nodiscard]] Innovation turn_excess(const Covariance& P) const;
-  /// The same of how much faster they moved than the state [m/s].
-  [[nodiscard]] Innovation way_excess(const Covariance& P) const;
-  /// The state was put in doubt by it.
-  void restart_way() { way_ = MeanExcess{}; }
+  /// state's error. By how much the cameras turned faster than the gyroscope of late [rad/s], in the mean, about the
+  /// axis where it is least likely; nothing if the images show too little.
+  std::optional<Innovation> add(const ImuMotion& motion, const StereoMotion& images, const Covariance& P, TimeNs t_ns);
 
   /// Factors on the noise of all samples, 1 or more.
   [[nodiscard]] ImuNoiseFactors noise() const;
@@ -48,28 +42,22 @@ class ImuScore {
     return {at_rest_.gyro / gyro_.weight(), std::max(at_rest_.accel / accel_.weight(), unseen_accel_)};
   }
 
-  /// What the images show beyond the inertial samples, the mean over the last moments, per axis [rad/s, m/s].
-  struct MeanExcess {
+  /// Means over the last moments, which forget in kStale.
+  struct Excess {
     double count = 0.0;
-    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    Eigen::Vector3d rate = Eigen::Vector3d::Zero();      ///< sum of the turns beyond the gyroscope's, over time [rad/s]
     Eigen::Vector3d variance = Eigen::Vector3d::Zero();  ///< of this sum, by noise
     double apparent = 0.0;                               ///< sum of the variances by the cameras' calibration
-
-    void add(const Eigen::Vector3d& value, const Eigen::Vector3d& noise, double by_calibration, double kept);
-    /// Where it is least likely. `common`: variances that all have in common.
-    [[nodiscard]] Innovation worst(const Eigen::Vector3d& common) const;
+    Eigen::Vector3d rate_B = Eigen::Vector3d::Zero();    ///< the gyroscope's, the last one [rad/s]
+    std::optional<TimeNs> last_ns;
   };
-  void add_excess(const Excess& turn, const Excess& way, const ImuMotion& motion, const Covariance& P, TimeNs t_ns);
+  std::optional<Innovation> add_excess(const ExcessTurn& turn, const ImuMotion& motion, const Covariance& P,
+                                       TimeNs t_ns);
 
   bool adapts_;
   ImuNoiseFactors at_rest_;  ///< on the stated noise, when it last stood or started
   double unseen_accel_ = 1.0;
-  MeanExcess turn_, way_;
-  struct {
-    std::optional<TimeNs> t_ns;
-    Eigen::Vector3d rate_B = Eigen::Vector3d::Zero();      ///< the gyroscope's [rad/s]
-    Eigen::Vector3d velocity_B = Eigen::Vector3d::Zero();  ///< the state's [m/s]
-  } last_;
+  Excess excess_;
   NoiseScore gyro_{kStreamMemory, kFarthest}, accel_{kStreamMemory, kFarthest};
 };
 

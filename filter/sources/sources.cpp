@@ -80,19 +80,11 @@ Displacements Sources::displacements(const FeatureFrame& frame, TimeNs t_ns, con
   return result;
 }
 
-/// Where the vehicle hovers few tracks end, and a velocity that is wrong shows nowhere else. By what the images show,
-/// and by the bias that makes it in a moment, the state may be off.
-void Sources::score_imu(const FeatureFrame& frame, const Consistency& consistency, Ekf& ekf, Records& records) {
+void Sources::score_imu(const FeatureFrame& frame, const Consistency& consistency, const Ekf& ekf, Records& records) {
   const std::optional<StereoMotion>& seen = cameras_.seen();
   if (!seen || consistency.anomalous == MotionSensor::camera) return;
-  if (!imu_score_.add(motion_, *seen, ekf.covariance(), frame.t_ns)) return;
-  records.log.add(Source::gyroscope, imu_score_.turn_excess(ekf.covariance()), ekf.state().imu.t_ns);
-  const Innovation way = imu_score_.way_excess(ekf.covariance());
-  if (way.fits) return;
-  imu_score_.restart_way();
-  const double faster = std::abs(way.value);
-  ekf.inflate_motion(0.0, faster, 0.5 * faster * kStale);
-  ekf.inflate(err::b_a, Eigen::Vector3d::Constant(faster / kStale));
+  const std::optional<Innovation> turn = imu_score_.add(motion_, *seen, ekf.covariance(), frame.t_ns);
+  if (turn) records.log.add(Source::gyroscope, *turn, ekf.state().imu.t_ns);
 }
 
 void Sources::advance(TimeNs t_ns, const Advice& advice, Ingest& ingest, Ekf& ekf, Records& records) {
