@@ -300,7 +300,7 @@ ALTERATIONS = [
     Alteration("imu_turned", "inertial sensors turned by 90 degrees about the vertical; so the mower's are right",
                on(["imu0"], through_matrix(QUARTER_TURN, (GYRO, ACCEL)))),
     Alteration("imu_yawed", "inertial sensors turned by 5 degrees about the vertical", on(["imu0"], through_matrix(YAWED, (GYRO, ACCEL)))),
-    Alteration("imu_pitched", "inertial sensors turned by 5 degrees about the left", on(["imu0"], through_matrix(PITCHED, (GYRO, ACCEL)))),
+    Alteration("imu_pitched", "the same about the left: until the vehicle turns, a slope", on(["imu0"], through_matrix(PITCHED, (GYRO, ACCEL)))),
     Alteration("gyro_degrees", "gyroscope in degrees per second", on(["imu0"], each_value(GYRO, lambda x, _: 57.29578 * x))),
     Alteration("accel_g", "accelerometer in g", on(["imu0"], each_value(ACCEL, lambda x, _: x / 9.80665))),
     Alteration("gyro_sign", "the yaw rate has the wrong sign", on(["imu0"], each_value((3,), lambda x, _: -x))),
