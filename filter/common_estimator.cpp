@@ -31,8 +31,7 @@ bool mounting_refuted(const PriorConfig& prior, const Calibration& given, const 
   };
   const State& x = ekf.state();
   return refuted(x.camera.T_BC0.R * camera_state(given).T_BC0.R.transpose(), prior.camera_rotation) ||
-         refuted(odometer_state(given).T_BO.R.transpose() * x.odometer.T_BO.R,
-                 has_beams(given) ? prior.odometer_rotation : prior.odometer_unseen);
+         refuted(odometer_state(given).T_BO.R.transpose() * x.odometer.T_BO.R, odometer_rotation_sigma(prior, given));
 }
 
 }  // namespace

@@ -173,6 +173,10 @@ Eigen::Vector3d lens_sigma(const PriorConfig& prior, const CameraCalibration& ca
   return {focal, centre / camera.fu, centre / camera.fv};
 }
 
+double odometer_rotation_sigma(const PriorConfig& prior, const Calibration& calibration) {
+  return has_beams(calibration) ? prior.odometer_rotation : prior.odometer_unseen;
+}
+
 CameraState camera_state(const Calibration& calibration) {
   CameraState camera;
   camera.time_offset = calibration.camera_time_offset;

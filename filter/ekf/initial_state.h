@@ -33,6 +33,9 @@ inline constexpr double kShakenAccel = 0.02;
 /// point over the focal length along u and v.
 [[nodiscard]] Eigen::Vector3d lens_sigma(const PriorConfig& prior, const CameraCalibration& camera);
 
+/// Standard deviation of the odometer's rotation in the body [rad], as stated or by the prior.
+[[nodiscard]] double odometer_rotation_sigma(const PriorConfig& prior, const Calibration& calibration);
+
 [[nodiscard]] CameraState camera_state(const Calibration& calibration);
 [[nodiscard]] OdometerState odometer_state(const Calibration& calibration);
 

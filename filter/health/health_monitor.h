@@ -53,7 +53,7 @@ class HealthMonitor {
     bool running = false;                 ///< there is a state
     bool possible = true;                 ///< and it and its covariance are numbers, variances not negative
     Reason waits_for = Reason::no_frame;  ///< what the start waits for
-    bool misaligned = false;              ///< Wheels::misaligned
+    bool misaligned = false;              ///< sensors point elsewhere than the calibration allows
     bool lifted = false;  ///< the vehicle just left the ground or met it, whatever is known of its contact
     FrameAgreement agreement;
     FrameStatistics statistics;

@@ -243,7 +243,7 @@ Eigen::VectorXd Start::sigma() const {
     if (online.wheels) sigma.segment<2>(err::wheel_radius).setConstant(prior.wheel_radius);
     if (online.wheels) sigma(err::track_width) = prior.track_width;
     if (online.odometer_rotation) {
-      sigma.segment<3>(err::odometer).setConstant(beams > 0 ? prior.odometer_rotation : prior.odometer_unseen);
+      sigma.segment<3>(err::odometer).setConstant(odometer_rotation_sigma(prior, calibration_));
     }
     if (online.axle) sigma.segment<3>(err::axle).setConstant(beams > 0 ? prior.axle : prior.axle_unseen);
     if (online.encoder_time_offset) sigma(err::encoder_offset) = prior.encoder_time_offset;

@@ -2,11 +2,11 @@
 #include <doctest/doctest.h>
 
 #include <Eigen/Geometry>
-#include <cmath>
 #include <functional>
 #include <string>
 
 #include "tools/experiments/figures.h"
+#include "tools/simulator/constants.h"
 #include "tools/simulator/simulation.h"
 
 using namespace ear;
@@ -14,7 +14,7 @@ using namespace ear;
 namespace {
 
 Eigen::Matrix3d turn(double degrees, const Eigen::Vector3d& axis) {
-  return Eigen::AngleAxisd(degrees * std::acos(-1.0) / 180.0, axis).toRotationMatrix();
+  return Eigen::AngleAxisd(degrees * simulator::kDegree, axis).toRotationMatrix();
 }
 
 void turn_cameras(Calibration& calibration, const Eigen::Matrix3d& R) {
@@ -63,6 +63,12 @@ Outcome drive(const std::string& sequence, std::uint64_t seed, const std::functi
   return outcome;
 }
 
+void check_said_at_once(const Outcome& outcome) {
+  CHECK(outcome.misaligned > 0.8);
+  CHECK(outcome.tracking < 0.15);
+  CHECK(outcome.false_tracking < 0.1);
+}
+
 }  // namespace
 
 // Without the comparison with the calibration such drives were "tracking" while far off for 60 to 90 % of the time, but
@@ -70,23 +76,14 @@ Outcome drive(const std::string& sequence, std::uint64_t seed, const std::functi
 TEST_CASE("mounting: what is turned by five degrees against the calibration is said to be, once it shows") {
   const Eigen::Vector3d up = Eigen::Vector3d::UnitZ(), left = Eigen::Vector3d::UnitY();
   SUBCASE("inertial sensors, about the vertical") {
-    const Outcome outcome = drive("wave1", 2111, [&](Calibration& c) { turn_body(c, turn(5.0, up)); });
-    CHECK(outcome.misaligned > 0.8);
-    CHECK(outcome.tracking < 0.15);
-    CHECK(outcome.false_tracking < 0.1);
+    check_said_at_once(drive("wave1", 2111, [&](Calibration& c) { turn_body(c, turn(5.0, up)); }));
   }
   SUBCASE("cameras, about the vertical") {
-    const Outcome outcome = drive("fly1", 2112, [&](Calibration& c) { turn_cameras(c, turn(-5.0, up)); });
-    CHECK(outcome.misaligned > 0.8);
-    CHECK(outcome.tracking < 0.15);
-    CHECK(outcome.false_tracking < 0.1);
+    check_said_at_once(drive("fly1", 2112, [&](Calibration& c) { turn_cameras(c, turn(-5.0, up)); }));
   }
   SUBCASE("wheels, about the vertical") {
-    const Outcome outcome = drive(
-        "flat1", 2113, [&](Calibration& c) { c.encoder->T_BO.linear() = c.encoder->T_BO.linear() * turn(5.0, up); });
-    CHECK(outcome.misaligned > 0.8);
-    CHECK(outcome.tracking < 0.15);
-    CHECK(outcome.false_tracking < 0.1);
+    check_said_at_once(drive(
+        "flat1", 2113, [&](Calibration& c) { c.encoder->T_BO.linear() = c.encoder->T_BO.linear() * turn(5.0, up); }));
   }
   // Pitch looks like a slope until the vehicle turns.
   SUBCASE("cameras, about the left") {

@@ -11,7 +11,7 @@ import shutil
 from dataclasses import dataclass
 from typing import Callable
 
-from real.layout import rotate
+from real.layout import NO_TURN, rotate, turned
 
 GYRO, ACCEL = (1, 2, 3), (4, 5, 6)  # columns of imu0
 CAMERAS = ("cam0", "cam1")
@@ -254,9 +254,7 @@ def begin_late(copy):
 
 LEANING = [[1.0, 0.01, 0.01], [0.01, 1.0, 0.01], [0.01, 0.01, 1.0]]
 QUARTER_TURN = [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
-COS_5, SIN_5 = math.cos(math.radians(5.0)), math.sin(math.radians(5.0))
-YAWED = [[COS_5, SIN_5, 0.0], [-SIN_5, COS_5, 0.0], [0.0, 0.0, 1.0]]
-PITCHED = [[COS_5, 0.0, SIN_5], [0.0, 1.0, 0.0], [-SIN_5, 0.0, COS_5]]
+YAWED, PITCHED = (turned(NO_TURN, axis) for axis in ([0.0, 0.0, -math.radians(5.0)], [0.0, math.radians(5.0), 0.0]))
 
 
 @dataclass(frozen=True)

@@ -141,6 +141,8 @@ def date_ns(text, where):
 
 # ---- rotations and poses, as lists of rows ------------------------------------------------------------------------------
 
+NO_TURN = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+
 
 def multiply(A, B):
     return [[sum(a * b for a, b in zip(row, column)) for column in zip(*B)] for row in A]
@@ -277,7 +279,7 @@ def pose_yaml(T):
     return f"T_BS:\n  rows: 4\n  cols: 4\n  data: [{rows}]\n"
 
 
-IDENTITY = pose([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], [0.0, 0.0, 0.0])
+IDENTITY = pose(NO_TURN, [0.0, 0.0, 0.0])
 
 
 def imu_yaml(comment, rate_hz, gyroscope, accelerometer):

@@ -11,7 +11,7 @@ import statistics
 
 from real.altered import CAMERAS, Copy, later, through_matrix
 from real.judge import figure
-from real.layout import BadInput, multiply, rotate, turned
+from real.layout import NO_TURN, BadInput, multiply, rotate, turned
 
 DEGREE = math.pi / 180
 LIST = r": *\[([^\]]*)\]"
@@ -19,7 +19,7 @@ LIST = r": *\[([^\]]*)\]"
 
 def turn(draws, sigma):
     """A rotation by a vector of three independent angles [rad]."""
-    return turned([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], shift(draws, sigma))
+    return turned(NO_TURN, shift(draws, sigma))
 
 
 def shift(draws, sigma):
