@@ -1,5 +1,6 @@
 #include "filter/filter.h"
 
+#include <cmath>
 #include <utility>
 
 #include "filter/ekf/initial_state.h"
@@ -47,7 +48,7 @@ void Filter::propagate_to(const FeatureFrame& frame) {
   const TimeNs t_ns = begin_frame(frame);
   if (ekf_.running()) {
     consistency_ = consistency_check_(sources_.displacements(frame, t_ns, ingest_, ekf_, sources_.ground().known()));
-    sources_.score_imu(frame, consistency_, ekf_, records_);
+    take_in_accel_jump(sources_.score_imu(frame, consistency_, ekf_, records_));
     sources_.advance(t_ns, advice(), ingest_, ekf_, records_);
   }
   if (!ekf_.running() || health_.lost()) {
@@ -57,15 +58,26 @@ void Filter::propagate_to(const FeatureFrame& frame) {
   }
 }
 
-/// A bias that jumped took the motion along until it was found out, for as long as the watch remembers. Both are less
-/// well known by what was observed. By wheels alone it looks the same as a wheel that slips.
+/// By wheels alone a bias that jumped looks the same as a wheel that slips.
 void Filter::watch_biases() {
   const bool by_wheels_alone = sources_.uses_wheels() && !sources_.cameras().show_motion(ekf_.state());
   const BiasChanges changes = ekf_.take_bias_changes();
   const TimeNs t_ns = ekf_.state().imu.t_ns;
   const BiasJump jump = bias_watch_.judge(by_wheels_alone ? BiasChanges::discarded() : changes, t_ns);
-  if (!jump.any()) return;
-  ekf_.inflate_motion(jump.gyro * kStale, jump.accel * kStale, 0.5 * jump.accel * kStale * kStale);
+  if (jump.any()) take_in(jump, t_ns);
+}
+
+/// What is more than any bias has another cause: sensors that are mounted elsewhere, clocks that differ.
+void Filter::take_in_accel_jump(double accel) {
+  if (accel == 0.0) return;
+  const bool bias = accel < std::sqrt(kFarthest) * config_.prior.accel_bias;
+  take_in({0.0, bias ? accel : 0.0, {false, true}}, ekf_.state().imu.t_ns);
+}
+
+/// A bias that jumped took the motion along until it was found out, for as long as the watch remembers. Both are less
+/// well known by what was observed.
+void Filter::take_in(const BiasJump& jump, TimeNs t_ns) {
+  ekf_.inflate_motion(jump.gyro * kStale, jump.accel * kStale, 0.0);
   ekf_.inflate(err::b_g, bias_sigma(jump.gyro, jump.accel));
   health_.report_imu_fault(jump.fault, t_ns);
 }

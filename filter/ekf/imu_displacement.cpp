@@ -35,6 +35,7 @@ ImuMotion imu_motion(const ImuState& x, const ImuBuffer& samples, TimeNs to_ns, 
       error_transition(begin, turned_B / motion.duration, gained_B / motion.duration, motion.duration, noise);
   const Eigen::Matrix3d R_BW = x.R_WB.transpose();
   motion.T_BiBj = {R_BW * end.R_WB, R_BW * end.p_WB};
+  motion.gained_W = end.v_W - begin.v_W;
   Eigen::Matrix<double, 3, err::imu_size> H_end = Eigen::Matrix<double, 3, err::imu_size>::Zero();
   H_end.middleCols<3>(err::theta) = -R_BW * skew(end.p_WB);
   H_end.middleCols<3>(err::rho) = R_BW;

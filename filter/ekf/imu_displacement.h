@@ -17,6 +17,7 @@ struct ImuMotion {
   Pose T_BiBj;
   Eigen::Matrix<double, 3, err::imu_size> H = Eigen::Matrix<double, 3, err::imu_size>::Zero();  ///< p by the error at i
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< of p, by the noise of the samples meanwhile [m^2]
+  Eigen::Vector3d gained_W = Eigen::Vector3d::Zero();    ///< velocity, in W [m/s]
   double turn_variance = 0.0;                            ///< of R, one axis, by the same [rad^2]
 
   /// Covariance of p by the error at i, whose covariance is `P` [m^2].

@@ -25,9 +25,9 @@ void ImuScore::add_rest(const ImuStatistics& rest, const ImuCalibration& stated)
 /// A mean over many frames shows what is too small to be seen in one of them: a bias that jumped. The noise averages
 /// out in it; the bias as the state knows it does not, nor what the errors of the cameras' mounting, focal length and
 /// time offset make look like a turn.
-std::optional<Innovation> ImuScore::add_excess(const ExcessTurn& turn, const ImuMotion& motion, const Covariance& P,
+std::optional<Innovation> ImuScore::add_excess(const Excess& turn, const ImuMotion& motion, const Covariance& P,
                                                TimeNs t_ns) {
-  Excess& e = excess_;
+  TurnExcess& e = turn_excess_;
   const double dt = motion.duration;
   if (!turn.value.allFinite() || !turn.covariance.allFinite() || !P.matrix().diagonal().allFinite())
     return std::nullopt;
@@ -55,8 +55,8 @@ std::optional<Innovation> ImuScore::add_excess(const ExcessTurn& turn, const Imu
   return worst;
 }
 
-std::optional<Innovation> ImuScore::add(const ImuMotion& motion, const StereoMotion& images, const Covariance& P,
-                                        TimeNs t_ns) {
+std::optional<Innovation> ImuScore::add(const ImuMotion& motion, const StereoMotion& images, const ImuState& x,
+                                        const Covariance& P, TimeNs t_ns) {
   if (!(motion.duration > 0.0) || images.fitting < kStill * images.matches) return std::nullopt;
   StereoMotion seen = images;
   seen.covariance *= kCommon;
@@ -67,9 +67,15 @@ std::optional<Innovation> ImuScore::add(const ImuMotion& motion, const StereoMot
     const double noise = motion.covariance(axis, axis) * at_rest_.accel * at_rest_.accel;
     accel_.add(shift(axis), {shift_variance(axis, axis), noise}, t_ns);
   }
-  const Eigen::Matrix3d believed = by_state + motion.covariance * std::pow(learned().accel, 2);
-  const ExcessTurn turn = turn_beyond(seen, motion.T_BiBj, believed);
+  const Eigen::Matrix3d by_samples = motion.covariance * std::pow(learned().accel, 2);
+  const Excess turn = turn_beyond(seen, motion.T_BiBj, by_state + by_samples);
   const std::optional<Innovation> excess = add_excess(turn, motion, P, t_ns);
+  const double dt = motion.duration;
+  const double rate_variance = P.matrix().diagonal().segment<3>(err::b_g).maxCoeff();
+  const Excess way =
+      way_beyond(seen, motion.T_BiBj, motion.turn_variance * std::pow(learned().gyro, 2) + rate_variance * dt * dt);
+  const Eigen::Matrix3d noise = x.R_WB * (way.covariance + by_samples) * x.R_WB.transpose() / (dt * dt);
+  accel_excess_.add({t_ns, dt, x.v_W, motion.gained_W, x.R_WB * way.value / dt, noise.diagonal()}, P);
   for (int axis = 0; axis < 3; ++axis) {
     const double bias = P.matrix()(err::b_g + axis, err::b_g + axis) * motion.duration * motion.duration;
     gyro_.add(turn.value(axis),

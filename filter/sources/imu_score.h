@@ -13,6 +13,7 @@
 #include "filter/ekf/records.h"
 #include "filter/ingest/imu_buffer.h"
 #include "filter/ingest/limits.h"
+#include "filter/sources/accel_excess.h"
 #include "filter/sources/cameras/stereo_motion.h"
 
 namespace ear {
@@ -29,10 +30,13 @@ class ImuScore {
   /// Where there is no camera: what the accelerometer's samples and the wheels show, as a factor. Images know better.
   /// Not the gyroscope's: wheels would turn the vehicle instead, whose track width is a guess.
   void set_unseen_accel(double factor) { unseen_accel_ = factor; }
-  /// The motion from the state to a frame at `t_ns` by the inertial samples, and as the images show it. `P`: of the
+  /// The motion from the state `x` to a frame at `t_ns` by the inertial samples, and as the images show it. `P`: of the
   /// state's error. By how much the cameras turned faster than the gyroscope of late [rad/s], in the mean, about the
   /// axis where it is least likely; nothing if the images show too little.
-  std::optional<Innovation> add(const ImuMotion& motion, const StereoMotion& images, const Covariance& P, TimeNs t_ns);
+  std::optional<Innovation> add(const ImuMotion& motion, const StereoMotion& images, const ImuState& x,
+                                const Covariance& P, TimeNs t_ns);
+  /// AccelExcess::take, of the same frames.
+  double take_accel_excess(const Covariance& P) { return accel_excess_.take(P); }
 
   /// Factors on the noise of all samples, 1 or more.
   [[nodiscard]] ImuNoiseFactors noise() const;
@@ -43,7 +47,7 @@ class ImuScore {
   }
 
   /// Means over the last moments, which forget in kStale.
-  struct Excess {
+  struct TurnExcess {
     double count = 0.0;
     Eigen::Vector3d rate = Eigen::Vector3d::Zero();      ///< sum of the turns beyond the gyroscope's, over time [rad/s]
     Eigen::Vector3d variance = Eigen::Vector3d::Zero();  ///< of this sum, by noise
@@ -51,13 +55,13 @@ class ImuScore {
     Eigen::Vector3d rate_B = Eigen::Vector3d::Zero();    ///< the gyroscope's, the last one [rad/s]
     std::optional<TimeNs> last_ns;
   };
-  std::optional<Innovation> add_excess(const ExcessTurn& turn, const ImuMotion& motion, const Covariance& P,
-                                       TimeNs t_ns);
+  std::optional<Innovation> add_excess(const Excess& turn, const ImuMotion& motion, const Covariance& P, TimeNs t_ns);
 
   bool adapts_;
   ImuNoiseFactors at_rest_;  ///< on the stated noise, when it last stood or started
   double unseen_accel_ = 1.0;
-  Excess excess_;
+  TurnExcess turn_excess_;
+  AccelExcess accel_excess_;
   NoiseScore gyro_{kStreamMemory, kFarthest}, accel_{kStreamMemory, kFarthest};
 };
 

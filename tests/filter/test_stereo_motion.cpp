@@ -184,13 +184,33 @@ TEST_CASE("frame check: what turns a little more than predicted shows in the tur
     CHECK(check.compare(matched(pair), {exp_so3(kTurn), 0.2 * kWay}, 0.0, cameras(), kGate).left < 0.1);
     const auto motion = stereo_motion(matched(pair), cameras(), Pose{}, kSigma);
     REQUIRE(motion);
-    const ExcessTurn turn = turn_beyond(*motion, {exp_so3(kTurn), 0.2 * kWay}, p_is_known);
+    const Excess turn = turn_beyond(*motion, {exp_so3(kTurn), 0.2 * kWay}, p_is_known);
     CHECK(turn.covariance.trace() < motion->covariance.topLeftCorner<3, 3>().trace());
     mean += turn.value / 50.0;
     const Eigen::Vector3d e = turn.value - more;
     squares += e.dot(turn.covariance.ldlt().solve(e)) / 50.0;
   }
   CHECK((mean - more).norm() < 2e-4);
+  CHECK(squares > 1.5);
+  CHECK(squares < 9.0);  // 3 times what ImuScore multiplies the covariance by
+}
+
+TEST_CASE("frame check: what moves a little more than predicted shows in the way, the better the turn is known") {
+  const Eigen::Vector3d more(0.02, -0.01, 0.015);
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  double squares = 0.0;
+  for (unsigned seed = 0; seed < 50; ++seed) {
+    const Pair pair = look(exp_so3(kTurn), 0.2 * kWay + more, kSigma, seed);
+    const auto motion = stereo_motion(matched(pair), cameras(), Pose{}, kSigma);
+    REQUIRE(motion);
+    const Excess way = way_beyond(*motion, {exp_so3(kTurn), 0.2 * kWay}, 1e-12);
+    CHECK(way.covariance.trace() < motion->p_covariance().trace());
+    CHECK(way_beyond(*motion, {exp_so3(kTurn), 0.2 * kWay}, 1.0).covariance.isApprox(motion->p_covariance(), 0.1));
+    mean += way.value / 50.0;
+    const Eigen::Vector3d e = way.value - more;
+    squares += e.dot(way.covariance.ldlt().solve(e)) / 50.0;
+  }
+  CHECK((mean - more).norm() < 2e-3);
   CHECK(squares > 1.5);
   CHECK(squares < 9.0);  // 3 times what ImuScore multiplies the covariance by
 }

@@ -190,12 +190,21 @@ std::optional<StereoMotion> stereo_motion(const std::vector<StereoMatch>& matche
   return motion;
 }
 
-ExcessTurn turn_beyond(const StereoMotion& seen, const Pose& T_B0B1, const Eigen::Matrix3d& p_covariance) {
+Excess turn_beyond(const StereoMotion& seen, const Pose& T_B0B1, const Eigen::Matrix3d& p_covariance) {
   const Eigen::Matrix3d by_p = seen.covariance.topRightCorner<3, 3>();
   const Eigen::LDLT<Eigen::Matrix3d> p_ldlt(seen.p_covariance() + p_covariance);
   const Eigen::Matrix3d gain = p_ldlt.solve(by_p.transpose()).transpose();
   return {log_so3(T_B0B1.R.transpose() * seen.T_B0B1.R) - gain * (seen.T_B0B1.p - T_B0B1.p),
           seen.covariance.topLeftCorner<3, 3>() - gain * by_p.transpose()};
+}
+
+Excess way_beyond(const StereoMotion& seen, const Pose& T_B0B1, double turn_variance) {
+  const Eigen::Matrix3d by_turn = seen.covariance.bottomLeftCorner<3, 3>();
+  Eigen::Matrix3d turn = seen.covariance.topLeftCorner<3, 3>();
+  turn.diagonal().array() += turn_variance;
+  const Eigen::Matrix3d gain = Eigen::LDLT<Eigen::Matrix3d>(turn).solve(by_turn.transpose()).transpose();
+  return {seen.T_B0B1.p - T_B0B1.p - gain * log_so3(T_B0B1.R.transpose() * seen.T_B0B1.R),
+          seen.p_covariance() - gain * by_turn.transpose()};
 }
 
 }  // namespace ear

@@ -58,14 +58,16 @@ struct StereoMotion {
   [[nodiscard]] Eigen::Matrix3d p_covariance() const { return covariance.bottomRightCorner<3, 3>(); }
 };
 
-/// By how much the body turned more than predicted, in B1 [rad].
-struct ExcessTurn {
+/// By how much the body turned [rad], in B1, or moved [m], in B0, more than predicted.
+struct Excess {
   Eigen::Vector3d value = Eigen::Vector3d::Zero();
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();
 };
 /// What the images show of the turn if the displacement is as predicted, to within `p_covariance`. Alone, a fit takes
 /// some of the displacement for a turn, since the depths are noisy.
-[[nodiscard]] ExcessTurn turn_beyond(const StereoMotion& seen, const Pose& T_B0B1, const Eigen::Matrix3d& p_covariance);
+[[nodiscard]] Excess turn_beyond(const StereoMotion& seen, const Pose& T_B0B1, const Eigen::Matrix3d& p_covariance);
+/// The same of the displacement if the turn is as predicted, each axis to within `turn_variance`.
+[[nodiscard]] Excess way_beyond(const StereoMotion& seen, const Pose& T_B0B1, double turn_variance);
 
 /// Least squares over rotation and translation: the points seen in frame 0, projected into both cameras of frame 1.
 /// Observations further off than `huber` standard deviations weigh less. `sigma`: one observation, normalized; `start`:
