@@ -26,6 +26,7 @@ void AccelExcess::add(const Frame& frame, const Covariance& P) {
     weights_.age(dt, kept);
     values_.age(dt, kept);
     variances_.age(dt, kept * kept);
+    gains_.age(dt, kept * kept);
     apparent_ *= kept;
     span_ += dt;
     corrected_W_ += frame.v_W - (last_.v_W + last_.gained_W);
@@ -34,6 +35,7 @@ void AccelExcess::add(const Frame& frame, const Covariance& P) {
   weights_.ones.array() += 1.0;
   values_.ones += frame.beyond_W + corrected_W_;
   variances_.ones += frame.beyond_variance;
+  gains_.ones += frame.gained_variance;
   const auto variance = [&P](int entry) { return std::max(0.0, P.matrix()(entry, entry)); };
   const double pointing = P.matrix().diagonal().segment<3>(err::camera).cwiseMax(0.0).maxCoeff();
   apparent_ += accel_W.squaredNorm() * (pointing + variance(err::lens(0)) + kPrecise * kPrecise) +
@@ -53,7 +55,9 @@ std::optional<AccelExcess::Growth> AccelExcess::growth(const Covariance& P) cons
   const double tilt = P.matrix().diagonal().segment<2>(err::theta).maxCoeff();
   const double bias = P.matrix().diagonal().segment<3>(err::b_a).maxCoeff();
   const Eigen::Array3d gravity = kGravity_W.squaredNorm() * tilt * Eigen::Array3d(1.0, 1.0, 0.0);
-  growth.variance = noise + apparent_ / s0 + gravity + bias;
+  // An error of the gained velocity lasts. One t before now turns the line by t / kStale^2 exp(t / kStale).
+  const Eigen::Array3d gained = gains_.squares / std::pow(kStale, 4);
+  growth.variance = noise + gained + apparent_ / s0 + gravity + bias;
   if (!growth.value.allFinite() || !(growth.variance.minCoeff() > 0.0)) return std::nullopt;
   return growth;
 }

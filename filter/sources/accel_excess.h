@@ -20,6 +20,7 @@ class AccelExcess {
     double duration = 0.0;                                     ///< [s], more than 0
     Eigen::Vector3d v_W = Eigen::Vector3d::Zero();             ///< the state's [m/s]
     Eigen::Vector3d gained_W = Eigen::Vector3d::Zero();        ///< velocity by the samples [m/s]
+    Eigen::Vector3d gained_variance = Eigen::Vector3d::Zero();  ///< of that, by noise
     Eigen::Vector3d beyond_W = Eigen::Vector3d::Zero();        ///< by how much faster the images show it to be [m/s]
     Eigen::Vector3d beyond_variance = Eigen::Vector3d::Ones();  ///< by noise, which no other frame shares
   };
@@ -48,7 +49,7 @@ class AccelExcess {
     void age(double dt, double kept);
   };
 
-  Sums weights_, values_, variances_;
+  Sums weights_, values_, variances_, gains_;
   Eigen::Vector3d corrected_W_ = Eigen::Vector3d::Zero();  ///< velocity, by updates since the line begins [m/s]
   double apparent_ = 0.0;  ///< sum of the variances by the cameras' calibration [m^2/s^4]
   double span_ = 0.0;      ///< [s] of the line

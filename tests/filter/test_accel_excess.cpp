@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <random>
+#include <utility>
 
 #include "filter/ingest/limits.h"
 
@@ -31,6 +32,7 @@ struct Vehicle {
   double wrong = 0.0;      ///< [m/s] of the velocity, along y, at the beginning
   double corrected = 0.0;  ///< share of the velocity's error that each frame corrects
   double noise = 1.0;      ///< of the images, times what is stated
+  double gained = 0.0;     ///< [m/s] noise of what the samples add in a frame
   Eigen::Vector3d accel = Eigen::Vector3d::Zero();
 
   Vehicle(double off_by, unsigned seed) : off(off_by), rng_(seed) {}
@@ -43,10 +45,11 @@ struct Vehicle {
     frame.t_ns = static_cast<TimeNs>(1e9 * kDt * ++steps_);
     frame.duration = kDt;
     frame.v_W = truth_ + error_;
-    const Eigen::Vector3d by_samples = kDt * Eigen::Vector3d::UnitX() * off;
+    const auto draw = [&] { return Eigen::Vector3d(Eigen::Vector3d::NullaryExpr([&] { return normal(rng_); })); };
+    const Eigen::Vector3d by_samples = kDt * Eigen::Vector3d::UnitX() * off + gained * draw();
     frame.gained_W = kDt * accel + by_samples;
-    frame.beyond_W = -error_ - 0.5 * by_samples +
-                     noise * kSigma * Eigen::Vector3d::NullaryExpr([&] { return normal(rng_); });
+    frame.gained_variance.setConstant(gained * gained);
+    frame.beyond_W = -error_ - 0.5 * by_samples + noise * kSigma * draw();
     frame.beyond_variance.setConstant(kSigma * kSigma);
     truth_ += kDt * accel;
     error_ += by_samples;
@@ -79,13 +82,14 @@ Found find(Vehicle vehicle, const Covariance& P, int frames) {
 
 TEST_CASE("accel excess: the growth of the velocity is the acceleration that is off, to within its variance") {
   const Covariance P = state_covariance(0.0, 0.0);
-  for (const double corrected : {0.0, 0.3}) {
+  for (const auto& [corrected, gained] : {std::pair{0.0, 0.0}, {0.3, 0.0}, {0.3, 0.005}, {0.3, 0.02}}) {
     double squares = 0.0, mean = 0.0;
     constexpr int kRuns = 400;
     for (unsigned seed = 0; seed < kRuns; ++seed) {
       Vehicle vehicle(0.3, seed);
       vehicle.accel.x() = -0.3;  // by the samples it does not move: nothing is allowed for the depths
       vehicle.corrected = corrected;
+      vehicle.gained = gained;
       AccelExcess excess;
       for (int i = 0; i < 60; ++i) excess.add(vehicle.next(), P);
       const auto growth = excess.growth(P);
@@ -95,6 +99,7 @@ TEST_CASE("accel excess: the growth of the velocity is the acceleration that is 
       squares += (error.square() / growth->variance).mean() / kRuns;
     }
     CAPTURE(corrected);
+    CAPTURE(gained);
     CHECK(std::abs(mean + 0.3) < 0.01);
     CHECK(squares > 0.85);  // 1200 draws: 0.04
     CHECK(squares < 1.15);
