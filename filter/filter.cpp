@@ -48,7 +48,7 @@ void Filter::propagate_to(const FeatureFrame& frame) {
   const TimeNs t_ns = begin_frame(frame);
   if (ekf_.running()) {
     consistency_ = consistency_check_(sources_.displacements(frame, t_ns, ingest_, ekf_, sources_.ground().known()));
-    take_in_accel_jump(sources_.score_imu(frame, consistency_, ekf_, records_));
+    take_in_accel_jump(sources_.score_imu(frame, ekf_, records_));
     sources_.advance(t_ns, advice(), ingest_, ekf_, records_);
   }
   if (!ekf_.running() || health_.lost()) {

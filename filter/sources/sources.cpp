@@ -80,9 +80,9 @@ Displacements Sources::displacements(const FeatureFrame& frame, TimeNs t_ns, con
   return result;
 }
 
-double Sources::score_imu(const FeatureFrame& frame, const Consistency& consistency, const Ekf& ekf, Records& records) {
+double Sources::score_imu(const FeatureFrame& frame, const Ekf& ekf, Records& records) {
   const std::optional<StereoMotion>& seen = cameras_.seen();
-  if (!seen || consistency.anomalous == MotionSensor::camera) return 0.0;
+  if (!seen) return 0.0;
   const ImuState& x = ekf.state().imu;
   const std::optional<Innovation> turn = imu_score_.add(motion_, *seen, x, ekf.covariance(), frame.t_ns);
   if (turn) records.log.add(Source::gyroscope, *turn, x.t_ns);

@@ -4,6 +4,7 @@
 #include <Eigen/Cholesky>
 #include <cstdint>
 #include <string>
+#include <utility>
 
 #include "tests/support/simulated_run.h"
 #include "tools/experiments/figures.h"
@@ -77,6 +78,19 @@ TEST_CASE("jumps: on the ground they cost little, are announced, and nothing is 
   const Outcome accel = run("flat1", "imu_bias_jump.accel");
   CHECK(accel.ate < 2.5 * clean);
   CHECK(accel.lost == 0.0);
+}
+
+TEST_CASE("jumps: a bias of the accelerometer that jumps while hardly a track ends is shown by pairs of images") {
+  for (const auto& [sequence, seed] : {std::pair{"fly1", 834}, {"fly1", 835}, {"fly2", 834}, {"flat1", 836}}) {
+    CAPTURE(sequence);
+    CAPTURE(seed);
+    const double clean = run(sequence, "", seed).ate;
+    const Outcome outcome = run(sequence, "imu_bias_jump.accel@20+5=0.05", seed);  // 0.5 m/s^2
+    CHECK(outcome.ate < 3.0 * clean);
+    CHECK(outcome.named);
+    CHECK(outcome.false_tracking == 0.0);
+    CHECK(outcome.lost == 0.0);
+  }
 }
 
 TEST_CASE("jumps: in flight an image that stays is as good as none") {
