@@ -17,18 +17,18 @@ class AccelExcess {
   /// From the state to a frame. Vectors are in W.
   struct Frame {
     TimeNs t_ns = 0;
-    double duration = 0.0;                                     ///< [s], more than 0
-    Eigen::Vector3d v_W = Eigen::Vector3d::Zero();             ///< the state's [m/s]
-    Eigen::Vector3d gained_W = Eigen::Vector3d::Zero();        ///< velocity by the samples [m/s]
+    double duration = 0.0;                                      ///< [s], more than 0
+    Eigen::Vector3d v_W = Eigen::Vector3d::Zero();              ///< the state's [m/s]
+    Eigen::Vector3d gained_W = Eigen::Vector3d::Zero();         ///< velocity by the samples [m/s]
     Eigen::Vector3d gained_variance = Eigen::Vector3d::Zero();  ///< of that, by noise
-    Eigen::Vector3d beyond_W = Eigen::Vector3d::Zero();        ///< by how much faster the images show it to be [m/s]
+    Eigen::Vector3d beyond_W = Eigen::Vector3d::Zero();         ///< by how much faster the images show it to be [m/s]
     Eigen::Vector3d beyond_variance = Eigen::Vector3d::Ones();  ///< by noise, which no other frame shares
   };
 
   /// `P`: of the state's error.
   void add(const Frame& frame, const Covariance& P);
-  /// How fast the velocity seems to grow beyond the samples [m/s^2], each axis of W, and the variance of that if nothing
-  /// jumped; nothing as long as too little was seen.
+  /// How fast the velocity seems to grow beyond the samples [m/s^2], each axis of W, and the variance of that if
+  /// nothing jumped; nothing as long as too little was seen.
   struct Growth {
     Eigen::Array3d value, variance;
   };

@@ -76,8 +76,8 @@ std::optional<Innovation> ImuScore::add(const ImuMotion& motion, const StereoMot
       way_beyond(seen, motion.T_BiBj, motion.turn_variance * std::pow(learned().gyro, 2) + rate_variance * dt * dt);
   const Eigen::Matrix3d noise = x.R_WB * (way.covariance + by_samples) * x.R_WB.transpose() / (dt * dt);
   const Eigen::Matrix3d gained = 3.0 / (dt * dt) * x.R_WB * by_samples * x.R_WB.transpose();  // T of T^3 / 3
-  accel_excess_.add(
-      {t_ns, dt, x.v_W, motion.gained_W, gained.diagonal(), x.R_WB * way.value / dt, noise.diagonal()}, P);
+  accel_excess_.add({t_ns, dt, x.v_W, motion.gained_W, gained.diagonal(), x.R_WB * way.value / dt, noise.diagonal()},
+                    P);
   for (int axis = 0; axis < 3; ++axis) {
     const double bias = P.matrix()(err::b_g + axis, err::b_g + axis) * motion.duration * motion.duration;
     gyro_.add(turn.value(axis),
