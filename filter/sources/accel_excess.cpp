@@ -14,11 +14,12 @@ void AccelExcess::Sums::age(double dt, double kept) {
 }
 
 /// Updates correct the velocity, and what was seen before them would be beyond it by that much more: it is counted from
-/// the samples alone.
+/// the samples alone. So the line ends where the samples between two frames are not known.
 void AccelExcess::add(const Frame& frame, const Covariance& P) {
   const double dt = last_.t_ns ? seconds_between(last_.t_ns, frame.t_ns) : INFINITY;
-  const bool next = dt > 0.0 && dt < kMissed * frame.duration;
+  const bool next = std::abs(dt - frame.duration) < kPrecise * frame.duration;
   if (!next) *this = AccelExcess{};
+  if (!frame.beyond_W.allFinite() || !frame.v_W.allFinite() || !frame.gained_W.allFinite()) return;
   const Eigen::Vector3d accel_W = frame.gained_W / frame.duration;
   Eigen::Vector3d jerk_W = Eigen::Vector3d::Zero();
   if (next) {
