@@ -4,7 +4,6 @@
 
 #include <cmath>
 #include <random>
-#include <utility>
 
 #include "filter/ingest/limits.h"
 
@@ -82,14 +81,19 @@ Found find(Vehicle vehicle, const Covariance& P, int frames) {
 
 TEST_CASE("accel excess: the growth of the velocity is the acceleration that is off, to within its variance") {
   const Covariance P = state_covariance(0.0, 0.0);
-  for (const auto& [corrected, gained] : {std::pair{0.0, 0.0}, {0.3, 0.0}, {0.3, 0.005}, {0.3, 0.02}}) {
+  struct Case {
+    double corrected, gained;
+  };
+  for (const Case& given : {Case{0.0, 0.0}, Case{0.3, 0.0}, Case{0.3, 0.005}, Case{0.3, 0.02}}) {
+    CAPTURE(given.corrected);
+    CAPTURE(given.gained);
     double squares = 0.0, mean = 0.0;
     constexpr int kRuns = 400;
     for (unsigned seed = 0; seed < kRuns; ++seed) {
       Vehicle vehicle(0.3, seed);
       vehicle.accel.x() = -0.3;  // by the samples it does not move: nothing is allowed for the depths
-      vehicle.corrected = corrected;
-      vehicle.gained = gained;
+      vehicle.corrected = given.corrected;
+      vehicle.gained = given.gained;
       AccelExcess excess;
       for (int i = 0; i < 60; ++i) excess.add(vehicle.next(), P);
       const auto growth = excess.growth(P);
@@ -98,8 +102,6 @@ TEST_CASE("accel excess: the growth of the velocity is the acceleration that is 
       const Eigen::Array3d error = growth->value - Eigen::Array3d(-0.3, 0.0, 0.0);
       squares += (error.square() / growth->variance).mean() / kRuns;
     }
-    CAPTURE(corrected);
-    CAPTURE(gained);
     CHECK(std::abs(mean + 0.3) < 0.01);
     CHECK(squares > 0.85);  // 1200 draws: 0.04
     CHECK(squares < 1.15);

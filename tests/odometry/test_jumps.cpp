@@ -4,7 +4,6 @@
 #include <Eigen/Cholesky>
 #include <cstdint>
 #include <string>
-#include <utility>
 
 #include "tests/support/simulated_run.h"
 #include "tools/experiments/figures.h"
@@ -81,11 +80,15 @@ TEST_CASE("jumps: on the ground they cost little, are announced, and nothing is 
 }
 
 TEST_CASE("jumps: a bias of the accelerometer that jumps while hardly a track ends is shown by pairs of images") {
-  for (const auto& [sequence, seed] : {std::pair{"fly1", 834}, {"fly1", 835}, {"fly2", 834}, {"flat1", 836}}) {
-    CAPTURE(sequence);
-    CAPTURE(seed);
-    const double clean = run(sequence, "", seed).ate;
-    const Outcome outcome = run(sequence, "imu_bias_jump.accel@20+5=0.05", seed);  // 0.5 m/s^2
+  struct Drive {
+    const char* sequence;
+    std::uint64_t seed;
+  };
+  for (const Drive& drive : {Drive{"fly1", 834}, Drive{"fly1", 835}, Drive{"fly2", 834}, Drive{"flat1", 836}}) {
+    CAPTURE(drive.sequence);
+    CAPTURE(drive.seed);
+    const double clean = run(drive.sequence, "", drive.seed).ate;
+    const Outcome outcome = run(drive.sequence, "imu_bias_jump.accel@20+5=0.05", drive.seed);  // 0.5 m/s^2
     CHECK(outcome.ate < 3.0 * clean);
     CHECK(outcome.named);
     CHECK(outcome.false_tracking == 0.0);
