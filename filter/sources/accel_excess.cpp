@@ -1,9 +1,9 @@
 #include "filter/sources/accel_excess.h"
 
-#include <algorithm>
 #include <cmath>
 
 #include "filter/ingest/limits.h"
+#include "filter/sources/cameras/stereo_motion.h"
 
 namespace ear {
 
@@ -37,10 +37,7 @@ void AccelExcess::add(const Frame& frame, const Covariance& P) {
   values_.ones += frame.beyond_W + corrected_W_;
   variances_.ones += frame.beyond_variance;
   gains_.ones += frame.gained_variance;
-  const auto variance = [&P](int entry) { return std::max(0.0, P.matrix()(entry, entry)); };
-  const double pointing = P.matrix().diagonal().segment<3>(err::camera).cwiseMax(0.0).maxCoeff();
-  apparent_ += accel_W.squaredNorm() * (pointing + variance(err::lens(0)) + kPrecise * kPrecise) +
-               jerk_W.squaredNorm() * variance(err::time_offset);
+  apparent_ += apparent_variance(P, accel_W, jerk_W) + accel_W.squaredNorm() * kPrecise * kPrecise;  // and of depths
   last_ = frame;
 }
 

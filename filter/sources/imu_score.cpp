@@ -33,13 +33,12 @@ std::optional<Innovation> ImuScore::add_excess(const Excess& turn, const ImuMoti
     return std::nullopt;
   const double since = e.last_ns ? seconds_between(*e.last_ns, t_ns) : kStale;
   const auto variance = [&P](int entry) { return std::max(0.0, P.matrix()(entry, entry)); };
-  const double mounting = P.matrix().diagonal().segment<3>(err::camera).cwiseMax(0.0).maxCoeff();
   const Eigen::Vector3d rate_B = log_so3(motion.T_BiBj.R) / dt;
   const Eigen::Vector3d change = since < kStale ? Eigen::Vector3d((rate_B - e.rate_B) / dt) : Eigen::Vector3d::Zero();
   const double kept = std::exp(-std::max(0.0, since) / kStale);
   e.count = kept * e.count + 1.0;
-  e.apparent = kept * e.apparent + rate_B.squaredNorm() * (mounting + variance(err::lens(0))) +
-               rate_B.squaredNorm() * variance(err::gyro_matrix) + change.squaredNorm() * variance(err::time_offset);
+  e.apparent =
+      kept * e.apparent + apparent_variance(P, rate_B, change) + rate_B.squaredNorm() * variance(err::gyro_matrix);
   e.rate_B = rate_B;
   e.last_ns = t_ns;
   const double noise = motion.turn_variance * std::pow(learned().gyro, 2);
@@ -79,7 +78,7 @@ std::optional<Innovation> ImuScore::add(const ImuMotion& motion, const StereoMot
   accel_excess_.add({t_ns, dt, x.v_W, motion.gained_W, gained.diagonal(), x.R_WB * way.value / dt, noise.diagonal()},
                     P);
   for (int axis = 0; axis < 3; ++axis) {
-    const double bias = P.matrix()(err::b_g + axis, err::b_g + axis) * motion.duration * motion.duration;
+    const double bias = P.matrix()(err::b_g + axis, err::b_g + axis) * dt * dt;
     gyro_.add(turn.value(axis),
               {bias + turn.covariance(axis, axis), motion.turn_variance * at_rest_.gyro * at_rest_.gyro}, t_ns);
   }

@@ -1,6 +1,7 @@
 // How noisy the inertial sensors are: at rest by their samples alone, in motion by what they measure between two images
 // of two cameras against what these show, and before that by the images of the start. Vibration, missing samples and
-// wrong stamps make them noisier than their data sheet. docs/filter.md, "Propagation".
+// wrong stamps make them noisier than their data sheet. And whether a bias jumped, by the same pairs of images.
+// docs/filter.md, "Propagation" and "Gaps and jumps".
 #pragma once
 
 #include <Eigen/Core>

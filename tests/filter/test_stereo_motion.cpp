@@ -173,46 +173,57 @@ TEST_CASE("frame check: the right motion fits, a wrong one does not") {
   CHECK(wrong.left > 0.9);
 }
 
+namespace {
+
+/// An excess in many draws: its mean, and the mean square of its error over what it states.
+struct Draws {
+  static constexpr unsigned kCount = 50;
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  double squares = 0.0;
+
+  void add(const Excess& found, const Eigen::Vector3d& truth) {
+    mean += found.value / kCount;
+    const Eigen::Vector3d e = found.value - truth;
+    squares += e.dot(found.covariance.ldlt().solve(e)) / kCount;
+  }
+};
+
+}  // namespace
+
 TEST_CASE("frame check: what turns a little more than predicted shows in the turn, not in the share") {
   const Eigen::Vector3d more(0.0005, -0.0003, 0.0007);
   const FrameCheck check(kSigma, 1.0);
   const Eigen::Matrix3d p_is_known = Eigen::Matrix3d::Identity() * 1e-10;
-  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-  double squares = 0.0;
-  for (unsigned seed = 0; seed < 50; ++seed) {
+  Draws draws;
+  for (unsigned seed = 0; seed < Draws::kCount; ++seed) {
     const Pair pair = look(exp_so3(kTurn) * exp_so3(more), 0.2 * kWay, kSigma, seed);
     CHECK(check.compare(matched(pair), {exp_so3(kTurn), 0.2 * kWay}, 0.0, cameras(), kGate).left < 0.1);
     const auto motion = stereo_motion(matched(pair), cameras(), Pose{}, kSigma);
     REQUIRE(motion);
     const Excess turn = turn_beyond(*motion, {exp_so3(kTurn), 0.2 * kWay}, p_is_known);
     CHECK(turn.covariance.trace() < motion->covariance.topLeftCorner<3, 3>().trace());
-    mean += turn.value / 50.0;
-    const Eigen::Vector3d e = turn.value - more;
-    squares += e.dot(turn.covariance.ldlt().solve(e)) / 50.0;
+    draws.add(turn, more);
   }
-  CHECK((mean - more).norm() < 2e-4);
-  CHECK(squares > 1.5);
-  CHECK(squares < 9.0);  // 3 times what ImuScore multiplies the covariance by
+  CHECK((draws.mean - more).norm() < 2e-4);
+  CHECK(draws.squares > 1.5);
+  CHECK(draws.squares < 9.0);  // 3 times what ImuScore multiplies the covariance by
 }
 
 TEST_CASE("frame check: what moves a little more than predicted shows in the way, the better the turn is known") {
   const Eigen::Vector3d more(0.02, -0.01, 0.015);
-  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-  double squares = 0.0;
-  for (unsigned seed = 0; seed < 50; ++seed) {
+  Draws draws;
+  for (unsigned seed = 0; seed < Draws::kCount; ++seed) {
     const Pair pair = look(exp_so3(kTurn), 0.2 * kWay + more, kSigma, seed);
     const auto motion = stereo_motion(matched(pair), cameras(), Pose{}, kSigma);
     REQUIRE(motion);
     const Excess way = way_beyond(*motion, {exp_so3(kTurn), 0.2 * kWay}, 1e-12);
     CHECK(way.covariance.trace() < motion->p_covariance().trace());
     CHECK(way_beyond(*motion, {exp_so3(kTurn), 0.2 * kWay}, 1.0).covariance.isApprox(motion->p_covariance(), 0.1));
-    mean += way.value / 50.0;
-    const Eigen::Vector3d e = way.value - more;
-    squares += e.dot(way.covariance.ldlt().solve(e)) / 50.0;
+    draws.add(way, more);
   }
-  CHECK((mean - more).norm() < 2e-3);
-  CHECK(squares > 1.5);
-  CHECK(squares < 9.0);  // 3 times what ImuScore multiplies the covariance by
+  CHECK((draws.mean - more).norm() < 2e-3);
+  CHECK(draws.squares > 1.5);
+  CHECK(draws.squares < 9.0);  // 3 times what ImuScore multiplies the covariance by
 }
 
 TEST_CASE("frame check: swapped images are seen at once") {

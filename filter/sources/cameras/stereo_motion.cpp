@@ -119,6 +119,19 @@ class Problem {
   std::array<Pose, 2> T_BC_;
 };
 
+/// The excess of the turn (`begin` 0) or of the displacement (3), if the other one is as predicted to within
+/// `covariance`.
+Excess beyond(const StereoMotion& seen, const Pose& T_B0B1, int begin, const Eigen::Matrix3d& covariance) {
+  const int other = 3 - begin;
+  Eigen::Matrix<double, 6, 1> excess;
+  excess << log_so3(T_B0B1.R.transpose() * seen.T_B0B1.R), seen.T_B0B1.p - T_B0B1.p;
+  const Eigen::Matrix3d across = seen.covariance.block<3, 3>(begin, other);
+  const Eigen::LDLT<Eigen::Matrix3d> ldlt(seen.covariance.block<3, 3>(other, other) + covariance);
+  const Eigen::Matrix3d gain = ldlt.solve(across.transpose()).transpose();
+  return {excess.segment<3>(begin) - gain * excess.segment<3>(other),
+          seen.covariance.block<3, 3>(begin, begin) - gain * across.transpose()};
+}
+
 }  // namespace
 
 StereoMatches::StereoMatches() {
@@ -191,20 +204,17 @@ std::optional<StereoMotion> stereo_motion(const std::vector<StereoMatch>& matche
 }
 
 Excess turn_beyond(const StereoMotion& seen, const Pose& T_B0B1, const Eigen::Matrix3d& p_covariance) {
-  const Eigen::Matrix3d by_p = seen.covariance.topRightCorner<3, 3>();
-  const Eigen::LDLT<Eigen::Matrix3d> p_ldlt(seen.p_covariance() + p_covariance);
-  const Eigen::Matrix3d gain = p_ldlt.solve(by_p.transpose()).transpose();
-  return {log_so3(T_B0B1.R.transpose() * seen.T_B0B1.R) - gain * (seen.T_B0B1.p - T_B0B1.p),
-          seen.covariance.topLeftCorner<3, 3>() - gain * by_p.transpose()};
+  return beyond(seen, T_B0B1, 0, p_covariance);
 }
 
 Excess way_beyond(const StereoMotion& seen, const Pose& T_B0B1, double turn_variance) {
-  const Eigen::Matrix3d by_turn = seen.covariance.bottomLeftCorner<3, 3>();
-  Eigen::Matrix3d turn = seen.covariance.topLeftCorner<3, 3>();
-  turn.diagonal().array() += turn_variance;
-  const Eigen::Matrix3d gain = Eigen::LDLT<Eigen::Matrix3d>(turn).solve(by_turn.transpose()).transpose();
-  return {seen.T_B0B1.p - T_B0B1.p - gain * log_so3(T_B0B1.R.transpose() * seen.T_B0B1.R),
-          seen.p_covariance() - gain * by_turn.transpose()};
+  return beyond(seen, T_B0B1, 3, turn_variance * Eigen::Matrix3d::Identity());
+}
+
+double apparent_variance(const Covariance& P, const Eigen::Vector3d& motion, const Eigen::Vector3d& change) {
+  const auto variance = [&P](int entry) { return std::max(0.0, P.matrix()(entry, entry)); };
+  const double mounting = P.matrix().diagonal().segment<3>(err::camera).cwiseMax(0.0).maxCoeff();
+  return motion.squaredNorm() * (mounting + variance(err::lens(0))) + change.squaredNorm() * variance(err::time_offset);
 }
 
 }  // namespace ear

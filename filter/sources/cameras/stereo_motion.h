@@ -8,6 +8,7 @@
 
 #include "ear/kernels.h"
 #include "ear/types.h"
+#include "filter/ekf/covariance.h"
 #include "filter/ekf/state.h"
 
 namespace ear {
@@ -68,6 +69,10 @@ struct Excess {
 [[nodiscard]] Excess turn_beyond(const StereoMotion& seen, const Pose& T_B0B1, const Eigen::Matrix3d& p_covariance);
 /// The same of the displacement if the turn is as predicted, each axis to within `turn_variance`.
 [[nodiscard]] Excess way_beyond(const StereoMotion& seen, const Pose& T_B0B1, double turn_variance);
+/// What errors of the cameras' mounting, focal length and time offset make look like an excess: its variance, of a rate
+/// or acceleration `motion` that changes by `change` a second. `P`: of the state's error.
+[[nodiscard]] double apparent_variance(const Covariance& P, const Eigen::Vector3d& motion,
+                                       const Eigen::Vector3d& change);
 
 /// Least squares over rotation and translation: the points seen in frame 0, projected into both cameras of frame 1.
 /// Observations further off than `huber` standard deviations weigh less. `sigma`: one observation, normalized; `start`:
