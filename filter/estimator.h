@@ -82,6 +82,8 @@ class Estimator {
   [[nodiscard]] virtual InputCounts input_counts() const = 0;  ///< of samples
   [[nodiscard]] virtual FrameStamp check_stamp(TimeNs t_ns) const = 0;
   [[nodiscard]] virtual CalibrationState calibration() const = 0;
+  /// The time of a frame with this stamp.
+  [[nodiscard]] TimeNs frame_time(TimeNs stamp_ns) const { return imu_time(stamp_ns, calibration().camera); }
   /// The stamp that the camera has at that time.
   [[nodiscard]] TimeNs camera_time(TimeNs imu_time_ns) const {
     return ear::camera_time(imu_time_ns, calibration().camera);

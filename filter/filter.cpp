@@ -48,7 +48,9 @@ void Filter::propagate_to(const FeatureFrame& frame) {
   const TimeNs t_ns = begin_frame(frame);
   if (ekf_.running()) {
     consistency_ = consistency_check_(sources_.displacements(frame, t_ns, ingest_, ekf_, sources_.ground().known()));
-    take_in_accel_jump(sources_.score_imu(frame, ekf_, records_));
+    const ImuExcess excess = sources_.score_imu(frame, ekf_, records_);
+    take_in_accel_jump(excess.accel);
+    if (config_.online_calibration.time_offset && excess.clock > 0.0) ekf_.inflate_clock(excess.clock);
     sources_.advance(t_ns, advice(), ingest_, ekf_, records_);
   }
   if (!ekf_.running() || health_.lost()) {
@@ -138,7 +140,9 @@ void Filter::make_room(TimeNs t_ns) { sources_.advance(t_ns, Advice{}, ingest_, 
 
 FrameStamp Filter::check_stamp(TimeNs t_ns) const {
   if (last_frame_ns_ && t_ns <= *last_frame_ns_) return FrameStamp::not_later;
-  const bool covered = is_time(t_ns) && ingest_.covers(imu_time(t_ns, ekf_.state().camera));
+  const TimeNs at_ns = imu_time(t_ns, ekf_.state().camera);
+  if (ekf_.running() && at_ns <= ekf_.state().imu.t_ns) return FrameStamp::not_later;  // it learned of another clock
+  const bool covered = is_time(t_ns) && ingest_.covers(at_ns);
   return covered ? FrameStamp::usable : FrameStamp::no_samples;
 }
 

@@ -8,6 +8,10 @@
 
 namespace ear {
 
+/// A step that is due now goes to this time: of a frame with this stamp, `frame_ns`, if that is earlier. Frames that
+/// come later by their clock would else lie before the step for ever, and be refused.
+[[nodiscard]] inline TimeNs step_time(TimeNs now_ns, TimeNs frame_ns) { return std::min(now_ns, frame_ns); }
+
 /// Without images the wheels carry on: always on a vehicle without a camera, else while images are missing. Without
 /// wheels there is nothing but inertia, and its estimate would be no more than a plausible lie. Times are IMU times.
 class BlindSteps {

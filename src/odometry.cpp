@@ -267,6 +267,7 @@ void Odometry::add_laser(const LaserSample& sample) { impl_->add_laser(sample); 
 std::optional<Estimate> Odometry::step(TimeNs t_ns) { return impl_->step(t_ns); }
 std::optional<Estimate> Odometry::add_stereo(const StereoFrame& frame) { return impl_->add_stereo(frame); }
 std::optional<NavState> Odometry::predict(TimeNs t_ns) const { return impl_->estimator().predict(t_ns); }
+TimeNs Odometry::frame_time(TimeNs stamp_ns) const { return impl_->estimator().frame_time(stamp_ns); }
 Status Odometry::status() const { return impl_->estimator().status(); }
 Health Odometry::health() const { return impl_->health(); }
 InputCounts Odometry::input_counts() const { return impl_->input_counts(); }

@@ -86,8 +86,7 @@ QueuedOdometry::QueuedOdometry(const Config& config, const Calibration& calibrat
                calibration.encoder ? calibration.encoder->time_offset : 0.0),
       laser_(calibration.lasers ? elements(capacity.seconds, calibration.lasers->rate_hz) : 0, {},
              calibration.lasers ? calibration.lasers->time_offset : 0.0),
-      frames_(calibration.cameras.empty() ? 0 : capacity.frame_slots, empty_frame(calibration.cameras),
-              calibration.camera_time_offset),
+      frames_(calibration.cameras.empty() ? 0 : capacity.frame_slots, empty_frame(calibration.cameras)),
       live_(imu_.queue.capacity()) {
   if (calibration.lasers) laser_sample_.range.resize(calibration.lasers->beams.size());
 }
@@ -144,7 +143,7 @@ void QueuedOdometry::drop_old_frames() {
   while (2 * imu_.queue.size() > imu_.queue.capacity() && frames_.queue.size() > 1) {
     frames_.queue.pop();
     frames_.overflows.fetch_add(1, std::memory_order_relaxed);
-    hand_over(imu_time(frames_.queue.front(), frames_.time_offset));
+    hand_over(next_frame_time());
   }
 }
 
@@ -172,7 +171,7 @@ Progress QueuedOdometry::process(std::optional<Estimate>& estimate, QueuedFrame*
     hand_over_samples();
     return Progress::no_frame;
   }
-  const TimeNs frame_ns = imu_time(frame, frames_.time_offset);
+  const TimeNs frame_ns = next_frame_time();
   hand_over(frame_ns);
   if (newest_imu_ns_ < frame_ns && !frames_.queue.full()) return Progress::no_frame;
   estimate = odometry_.add_stereo(view_of(*frame, cameras_));
@@ -185,8 +184,7 @@ Progress QueuedOdometry::process(std::optional<Estimate>& estimate, QueuedFrame*
 void QueuedOdometry::hand_over_samples() { hand_over(std::numeric_limits<TimeNs>::max()); }
 
 std::optional<TimeNs> QueuedOdometry::next_frame_ns() const {
-  const QueuedFrame* const frame = frames_.queue.front();
-  return frame == nullptr ? std::nullopt : std::optional(imu_time(frame, frames_.time_offset));
+  return frames_.queue.front() == nullptr ? std::nullopt : std::optional(next_frame_time());
 }
 
 std::optional<Estimate> QueuedOdometry::step(TimeNs t_ns) {

@@ -2,6 +2,7 @@
 
 #include <sys/resource.h>
 
+#include <deque>
 #include <optional>
 #include <stdexcept>
 #include <utility>
@@ -78,7 +79,7 @@ class Bench {
     const auto before_sample = [this](const Sample& sample) {
       reading_.stop();
       if (const auto* frame = std::get_if<RecordedFrame>(&sample)) {
-        frame_ = *frame;  // put aside by replay() too, with a copy that a driver would not make: not measured
+        frames_.push_back(*frame);  // put aside by replay() too, with a copy that a driver would not make: not measured
         return;
       }
       samples_seconds_ = pipeline_.seconds();
@@ -114,7 +115,8 @@ class Bench {
 
  private:
   void take(const ReplayedFrame& replayed) {
-    if (!frame_ || frame_->t_ns != replayed.t_ns || !pipeline_.running()) return;  // no image, or out of turn
+    while (!frames_.empty() && frames_.front().t_ns < replayed.t_ns) frames_.pop_front();  // out of turn
+    if (frames_.empty() || frames_.front().t_ns != replayed.t_ns || !pipeline_.running()) return;
     pipeline_.stop();
     const auto [seconds, allocations] = pipeline_.take();
     pipeline_s_.add(seconds);
@@ -132,15 +134,15 @@ class Bench {
     const double other = other_threads_cpu_time();
     read_s_.add(reading_.take().first + other - other_seconds_);
     other_seconds_ = other;
-    floor_s_.add(floor_.measure(*frame_));
-    frame_.reset();
+    floor_s_.add(floor_.measure(frames_.front()));
+    frames_.pop_front();
     pipeline_.start();
   }
 
   Odometry odometry_;
   Floor floor_;
   Recording& recording_;
-  std::optional<RecordedFrame> frame_;  // the one that replay() hands over next
+  std::deque<RecordedFrame> frames_;  // that replay() hands over next
   Meter pipeline_, reading_;
   double other_seconds_ = 0.0;
   double samples_seconds_ = 0.0;  // since the last frame, without the sample that released it

@@ -1,6 +1,7 @@
 #include "tools/replay.h"
 
 #include <algorithm>
+#include <deque>
 
 #include "src/blind_steps.h"
 
@@ -17,7 +18,6 @@ class Replay {
         on_frame_(on_frame),
         before_sample_(before_sample),
         after_sample_(after_sample),
-        camera_offset_ns_(static_cast<TimeNs>(1e9 * recording.calibration().camera_time_offset)),
         steps_(!recording.calibration().cameras.empty(), recording.calibration().encoder.has_value()) {}
 
   void run() {
@@ -26,31 +26,47 @@ class Replay {
       std::visit([this](const auto& s) { take(s); }, *sample);
       if (after_sample_) after_sample_(*sample);
     }
-    hand_over();
+    while (!waiting_.empty()) hand_over();
   }
 
  private:
   void take(const ImuSample& imu) {
     odometry_.add_imu(imu);
     imu_ns_ = imu.t_ns;
-    if (waiting_ && imu_ns_ >= std::min(frame_time(), waiting_until_ns_)) hand_over();
-    if (!waiting_ && steps_.due(imu.t_ns)) on_frame_({imu.t_ns, odometry_.step(imu.t_ns)});
+    while (!waiting_.empty() && imu_ns_ >= std::min(frame_time(), longest_wait())) hand_over();
+    if (!waiting_.empty()) return;
+    const TimeNs t_ns = step_time(imu.t_ns, odometry_.frame_time(imu.t_ns));
+    if (steps_.due(t_ns)) on_frame_({t_ns, odometry_.step(t_ns)});
   }
   void take(const EncoderSample& encoder) { odometry_.add_encoder(encoder); }
   void take(const LaserSample& laser) { odometry_.add_laser(laser); }
   void take(const RecordedFrame& frame) {
-    hand_over();  // there is one waiting only if the inertial samples stopped
-    waiting_ = std::make_unique<RecordedFrame>(frame);
-    waiting_until_ns_ = imu_ns_ + kLongestWait;
+    const bool samples_stopped = !waiting_.empty() && waiting_.back().read_ns == imu_ns_;
+    if (samples_stopped) hand_over();
+    waiting_.push_back({frame, imu_ns_});
   }
 
-  [[nodiscard]] TimeNs frame_time() const { return waiting_->t_ns + camera_offset_ns_; }
+  struct WaitingFrame {
+    RecordedFrame frame;
+    TimeNs read_ns = 0;  ///< the newest inertial sample then
+  };
+
+  [[nodiscard]] TimeNs frame_time() const { return odometry_.frame_time(waiting_.front().frame.t_ns); }
+
+  /// By then the inertial samples of the oldest frame have come, unless its stamp is wrong.
+  [[nodiscard]] TimeNs longest_wait() const {
+    const auto& [frame, read_ns] = waiting_.front();
+    const TimeNs learned = duration_ns(later_by(recording_.calibration().camera_time_offset, frame.t_ns), frame_time());
+    return read_ns + kLongestWait + std::max<TimeNs>(0, learned);
+  }
 
   void hand_over() {
-    if (!waiting_) return;
-    on_frame_({waiting_->t_ns, odometry_.add_stereo(*waiting_)});
-    if (frame_time() <= waiting_until_ns_) steps_.saw_frame(frame_time());  // else it was refused
-    waiting_.reset();
+    const RecordedFrame& frame = waiting_.front().frame;
+    const TimeNs t_ns = frame_time();
+    const bool usable = t_ns <= longest_wait();  // else it is refused
+    on_frame_({frame.t_ns, odometry_.add_stereo(frame)});
+    if (usable) steps_.saw_frame(t_ns);
+    waiting_.pop_front();
   }
 
   static constexpr TimeNs kLongestWait = 60'000'000;
@@ -60,11 +76,9 @@ class Replay {
   const std::function<void(const ReplayedFrame&)>& on_frame_;
   const std::function<void(const Sample&)>& before_sample_;
   const std::function<void(const Sample&)>& after_sample_;
-  TimeNs camera_offset_ns_;
   BlindSteps steps_;
-  std::unique_ptr<RecordedFrame> waiting_;
-  TimeNs waiting_until_ns_ = 0;  ///< by then the inertial samples of its stamp have come, unless that is wrong
-  TimeNs imu_ns_ = 0;            ///< the newest sample
+  std::deque<WaitingFrame> waiting_;
+  TimeNs imu_ns_ = 0;  ///< the newest sample
 };
 
 }  // namespace

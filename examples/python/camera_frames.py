@@ -31,7 +31,7 @@ def main(folder):
 
     def on_imu(t_ns, gyro, accel):
         odometry.add_imu(t_ns, gyro, accel)
-        while waiting and waiting[0][0] < t_ns:
+        while waiting and odometry.frame_time(waiting[0][0]) < t_ns:
             estimate = odometry.add_stereo(*waiting.pop(0))
             if estimate:
                 x, y, z = estimate.state.p_WB

@@ -229,6 +229,25 @@ void Ekf::inflate_time(double seconds) {
   covariance_.inflate(err::theta, Eigen::Matrix<double, 9, 9>(seconds * seconds * J * J.transpose()));
 }
 
+/// A clone's motion is that between those before and after it, or the state.
+void Ekf::inflate_clock(double seconds) {
+  Eigen::Ref<Eigen::VectorXd> J = covariance_.room();
+  J.setZero();
+  J(err::time_offset) = seconds;
+  const std::vector<Clone>& clones = state_.clones;
+  for (std::size_t i = 0; i < clones.size(); ++i) {
+    const Clone& from = clones[i > 0 ? i - 1 : 0];
+    const bool last = i + 1 == clones.size();
+    const Pose to = last ? state_.imu.T_WB() : clones[i + 1].T_WB;
+    const double dt = seconds_between(from.t_ns, last ? state_.imu.t_ns : clones[i + 1].t_ns);
+    if (!(dt > 0.0)) continue;
+    const Eigen::Vector3d rate_W = from.T_WB.R * log_so3(from.T_WB.R.transpose() * to.R) / dt;
+    const Eigen::Vector3d v_W = (to.p - from.T_WB.p) / dt;
+    J.segment<6>(err::clone(static_cast<int>(i))) << seconds * rate_W, seconds * (v_W + clones[i].T_WB.p.cross(rate_W));
+  }
+  covariance_.inflate_along(J);
+}
+
 void Ekf::inflate(int first, const Eigen::Ref<const Eigen::VectorXd>& sigma) {
   for (int i = 0; i < sigma.size(); ++i) {
     covariance_.inflate(first + i, Eigen::Matrix<double, 1, 1>(sigma(i) * sigma(i)));

@@ -91,6 +91,9 @@ class Ekf {
   /// For `duration` [s] measurements held the state back: now by these [m/s, m] times one unknown of standard deviation
   /// 1, its clones since then by less. What they did to the biases is no change of these.
   void inflate_held(const Eigen::Vector3d& v_W, const Eigen::Vector3d& p_W, double duration);
+  /// The cameras' time offset may be off by this standard deviation [s] besides, and the clones by what they moved
+  /// meanwhile.
+  void inflate_clock(double seconds);
   /// By that of the time that passed [s]: turn and velocity by one unknown, the place by another.
   void inflate_time(double seconds);
   /// The entries from `first` on may be elsewhere by these standard deviations besides, each by itself.

@@ -70,9 +70,11 @@ std::optional<Innovation> ImuScore::add(const ImuMotion& motion, const StereoMot
   const Excess turn = turn_beyond(seen, motion.T_BiBj, by_state + by_samples);
   const std::optional<Innovation> excess = add_excess(turn, motion, P, t_ns);
   const double dt = motion.duration;
+  const double turn_noise = motion.turn_variance * std::pow(learned().gyro, 2);
+  clock_excess_.add({t_ns, dt, log_so3(motion.T_BiBj.R) / dt, turn.value / dt,
+                     (turn.covariance.trace() / 3.0 + turn_noise) / (dt * dt)});
   const double rate_variance = P.matrix().diagonal().segment<3>(err::b_g).maxCoeff();
-  const Excess way =
-      way_beyond(seen, motion.T_BiBj, motion.turn_variance * std::pow(learned().gyro, 2) + rate_variance * dt * dt);
+  const Excess way = way_beyond(seen, motion.T_BiBj, turn_noise + rate_variance * dt * dt);
   const Eigen::Matrix3d noise = x.R_WB * (way.covariance + by_samples) * x.R_WB.transpose() / (dt * dt);
   const Eigen::Matrix3d gained = 3.0 / (dt * dt) * x.R_WB * by_samples * x.R_WB.transpose();  // T of T^3 / 3
   accel_excess_.add({t_ns, dt, x.v_W, motion.gained_W, gained.diagonal(), x.R_WB * way.value / dt, noise.diagonal()},

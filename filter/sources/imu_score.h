@@ -16,8 +16,15 @@
 #include "filter/ingest/limits.h"
 #include "filter/sources/accel_excess.h"
 #include "filter/sources/cameras/stereo_motion.h"
+#include "filter/sources/clock_excess.h"
 
 namespace ear {
+
+/// By how much the samples differ from what the images show; 0: not by more than may be.
+struct ImuExcess {
+  double accel = 0.0;  ///< the accelerometer's bias has jumped [m/s^2]
+  double clock = 0.0;  ///< that of the cameras is off [s]
+};
 
 class ImuScore {
  public:
@@ -36,8 +43,10 @@ class ImuScore {
   /// axis where it is least likely; nothing if the images show too little.
   std::optional<Innovation> add(const ImuMotion& motion, const StereoMotion& images, const ImuState& x,
                                 const Covariance& P, TimeNs t_ns);
-  /// AccelExcess::take, of the same frames.
-  double take_accel_excess(const Covariance& P) { return accel_excess_.take(P); }
+  /// AccelExcess::take and ClockExcess::take, of the same frames.
+  ImuExcess take_excess(const Covariance& P) {
+    return {accel_excess_.take(P), clock_excess_.take(P.matrix()(err::time_offset, err::time_offset))};
+  }
 
   /// Factors on the noise of all samples, 1 or more.
   [[nodiscard]] ImuNoiseFactors noise() const;
@@ -63,6 +72,7 @@ class ImuScore {
   double unseen_accel_ = 1.0;
   TurnExcess turn_excess_;
   AccelExcess accel_excess_;
+  ClockExcess clock_excess_;
   NoiseScore gyro_{kStreamMemory, kFarthest}, accel_{kStreamMemory, kFarthest};
 };
 

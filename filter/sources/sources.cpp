@@ -80,13 +80,13 @@ Displacements Sources::displacements(const FeatureFrame& frame, TimeNs t_ns, con
   return result;
 }
 
-double Sources::score_imu(const FeatureFrame& frame, const Ekf& ekf, Records& records) {
+ImuExcess Sources::score_imu(const FeatureFrame& frame, const Ekf& ekf, Records& records) {
   const std::optional<StereoMotion>& seen = cameras_.seen();
-  if (!seen) return 0.0;
+  if (!seen) return {};
   const ImuState& x = ekf.state().imu;
   const std::optional<Innovation> turn = imu_score_.add(motion_, *seen, x, ekf.covariance(), frame.t_ns);
   if (turn) records.log.add(Source::gyroscope, *turn, x.t_ns);
-  return imu_score_.take_accel_excess(ekf.covariance());
+  return imu_score_.take_excess(ekf.covariance());
 }
 
 void Sources::advance(TimeNs t_ns, const Advice& advice, Ingest& ingest, Ekf& ekf, Records& records) {

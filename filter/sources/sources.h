@@ -48,9 +48,9 @@ class Sources {
   /// is one that the lasers have seen.
   [[nodiscard]] Displacements displacements(const FeatureFrame& frame, TimeNs t_ns, const Ingest& ingest,
                                             const Ekf& ekf, bool ground_known);
-  /// After it: how noisy the inertial sensors are by what the images show of the same motion.
-  /// By how much the accelerometer's bias has jumped [m/s^2]; 0: it has not.
-  double score_imu(const FeatureFrame& frame, const Ekf& ekf, Records& records);
+  /// After it: how noisy the inertial sensors are by what the images show of the same motion. What noise and the
+  /// state's own variances do not explain.
+  ImuExcess score_imu(const FeatureFrame& frame, const Ekf& ekf, Records& records);
   /// Propagates to `t_ns`, with wheels (5)-(8) and lasers (2)-(4) in between: each at its own time, or, if the state
   /// has passed that already, where the state was then.
   void advance(TimeNs t_ns, const Advice& advice, Ingest& ingest, Ekf& ekf, Records& records);

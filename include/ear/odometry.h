@@ -49,6 +49,10 @@ class Odometry {
   /// to the byte, which shows nothing new; predict() goes on.
   std::optional<Estimate> add_stereo(const StereoFrame& frame);
 
+  /// When a frame with this stamp was taken [ns, IMU time], by what is known so far of the cameras' clock: so long it
+  /// should wait for inertial samples. One that they do not reach by 40 ms is refused.
+  [[nodiscard]] TimeNs frame_time(TimeNs stamp_ns) const;
+
   /// The estimate at a time without an image [ns, IMU time], from all other sensors: for vehicles without a camera,
   /// while images do not come, and between them; tracks go on over it. Nothing with cameras, off the ground: see
   /// predict(). Nor while the newest inertial samples, up to five, may be a spike: the next step counts them rightly.

@@ -59,6 +59,13 @@ void bind_odometry(py::module_& module) {
       .def("add_stereo", &add_stereo, arg("t_ns"), arg("left"), arg("right") = py::none(),
            "The estimate at the time of these images, uint8 of the shape (height, width), or None.")
       .def(
+          "frame_time",
+          [](GuardedOdometry& self, py::handle t_ns) {
+            const TimeNs t = integer_from(t_ns, "t_ns");
+            return self.quick([&](auto& e) { return e.odometry.frame_time(t); });
+          },
+          arg("t_ns"), "When a frame with this stamp was taken, by what is known of the clocks [ns, IMU time].")
+      .def(
           "step",
           [](GuardedOdometry& self, py::handle t_ns) {
             const TimeNs t = integer_from(t_ns, "t_ns");

@@ -91,6 +91,7 @@ FUNCTIONS = {
     "add_laser": ["self, sample: LaserSample) -> None", "self, t_ns: int, range: Sequence[float]) -> None"],
     "add_stereo": ["self, frame: StereoFrame) -> Estimate | None",
                    f"self, t_ns: int, left: {IMAGE}, right: {IMAGE} | None = None) -> Estimate | None"],
+    "frame_time": ["self, t_ns: int) -> int"],
     "start_at": ["self, start: GivenStart) -> None"],
     "predict": ["self, t_ns: int) -> NavState | None"],
     "step": ["self, t_ns: int) -> Estimate | None"],

@@ -183,8 +183,9 @@ void LiveEstimator::take_sample() {
   if (listeners_.on_imu) listeners_.on_imu(sample);
   if (!handed_over_ns_) handed_over_ns_ = reached_ns_;
   if (queued_.next_frame_ns()) return;
-  if (steps_.due(reached_ns_)) {
-    step_ns_ = reached_ns_;
+  const TimeNs step_ns = step_time(reached_ns_, queued_.odometry().frame_time(reached_ns_));
+  if (steps_.due(step_ns)) {
+    step_ns_ = step_ns;
   } else if (std::abs(duration_ns(*handed_over_ns_, reached_ns_)) > kLongestHeld) {
     handed_over_ns_ = reached_ns_;
     queued_.hand_over_samples();

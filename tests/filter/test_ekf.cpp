@@ -272,6 +272,33 @@ TEST_CASE("ekf: inflated motion is about the body, inflated biases are each sens
   CHECK(after(err::b_a, err::b_a) == doctest::Approx(before(err::b_a, err::b_a) + 0.25));
 }
 
+TEST_CASE("ekf: a clock that may be further off is as if less had been known of it when the clones were made") {
+  const auto with_clones = [](double time_offset) {
+    Ekf ekf(FilterConfig{}, vehicle());
+    ImuState x;
+    x.t_ns = kStart;
+    x.v_W = {1.0, 0.0, 0.0};
+    x.p_WB = {3.0, 2.0, 1.0};
+    Eigen::VectorXd sigma = Eigen::VectorXd::Constant(err::clones, 1e-3);
+    sigma(err::time_offset) = time_offset;
+    ekf.start(x, sigma);
+    const ImuBuffer imu = samples();
+    for (int i = 1; i <= 6; ++i) {
+      ekf.propagate(imu, kStart + i * 50'000'000, {}, 0.0);
+      ekf.clone(1.0);
+    }
+    return ekf;
+  };
+  const double known = 0.002, off = 0.05;
+  Ekf ekf = with_clones(known);
+  const Eigen::MatrixXd before = ekf.covariance().matrix();
+  ekf.inflate_clock(off);
+  const Eigen::MatrixXd added = ekf.covariance().matrix() - before;
+  const Eigen::MatrixXd expected = with_clones(std::hypot(known, off)).covariance().matrix() - before;
+  CHECK(expected.norm() > 0.01);
+  CHECK((added - expected).norm() < 0.03 * expected.norm());  // a clone's motion is by its neighbours
+}
+
 TEST_CASE("ekf: what was held down is one error of velocity, position and the clones since") {
   Ekf ekf = started();
   const ImuBuffer imu = samples();

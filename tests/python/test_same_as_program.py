@@ -24,27 +24,26 @@ def run_program(*arguments):
 
 def fed_by_hand(recording, odometry):
     """What `ear run` does, sample by sample: a frame is handed over when the first inertial sample after it is in."""
-    estimates, waiting = [], None
-    offset_ns = int(1e9 * recording.calibration.camera_time_offset)
+    estimates, waiting = [], []
 
     def hand_over():
-        estimate = odometry.add_stereo(waiting.t_ns, waiting.left, waiting.right)
+        frame = waiting.pop(0)
+        estimate = odometry.add_stereo(frame.t_ns, frame.left, frame.right)
         if estimate:
             estimates.append(estimate)
 
     for sample in recording:
         if isinstance(sample, ear.ImuSample):
             odometry.add_imu(sample.t_ns, sample.gyro_B, sample.accel_B)
-            if waiting and sample.t_ns >= waiting.t_ns + offset_ns:
+            while waiting and sample.t_ns >= odometry.frame_time(waiting[0].t_ns):
                 hand_over()
-                waiting = None
         elif isinstance(sample, ear.EncoderSample):
             odometry.add_encoder(sample.t_ns, sample.left_count, sample.right_count)
         elif isinstance(sample, ear.LaserSample):
             odometry.add_laser(sample.t_ns, sample.range)
         else:
-            waiting = sample
-    if waiting:
+            waiting.append(sample)
+    while waiting:
         hand_over()
     return estimates
 

@@ -40,7 +40,8 @@ void replay(const simulator::Simulation& simulation, Estimator& estimator, const
         report(frame.t_ns, result);
       }
     } else if (delivery.stream == simulator::SensorStream::imu && steps.due(delivery.arrival_ns)) {
-      const TimeNs stamp_ns = estimator.camera_time(simulation.imu()[delivery.index].t_ns);
+      const TimeNs now_ns = simulation.imu()[delivery.index].t_ns;
+      const TimeNs stamp_ns = estimator.camera_time(step_time(now_ns, estimator.frame_time(now_ns)));
       timed([&] { result = estimator.process_without_image(stamp_ns); });
       report(stamp_ns, result);
     }

@@ -17,6 +17,7 @@ GYRO, ACCEL = (1, 2, 3), (4, 5, 6)  # columns of imu0
 CAMERAS = ("cam0", "cam1")
 WHEELS = "encoder0"
 BEAMS = "laser0"
+TRUTHS = ("state_groundtruth_estimate0", "uwb0")
 NO_SENSOR = ("state_groundtruth", "uwb", "ins_speed", "wheel_speed", "imu0_")  # truths, and originals that were made into others
 
 
@@ -283,8 +284,8 @@ ALTERATIONS = [
     Alteration("imu_lost", "a tenth of the inertial samples lost, at random", lost_samples),
     Alteration("imu_bursts", "inertial samples lost eight times a second, for up to 0.1 s", on(["imu0"], bursts)),
     Alteration("imu_frozen", "inertial samples repeat for half a second, every ten", on(["imu0"], repeated_samples)),
-    Alteration("imu_late", "stamps of the inertial samples 20 ms late", on(["imu0"], later(0.02))),
-    Alteration("imu_very_late", "the same by 100 ms", on(["imu0"], later(0.1))),
+    Alteration("imu_late", "stamps of the inertial samples, which estimate and truth have, 20 ms late", on(["imu0", *TRUTHS], later(0.02))),
+    Alteration("imu_very_late", "the same by 100 ms", on(["imu0", *TRUTHS], later(0.1))),
     Alteration("imu_noise", "white noise of 0.05 rad/s and 0.5 m/s^2 on each sample", noisy_imu),
     Alteration("imu_spikes", "spikes of one to five inertial samples, 20 a minute, of 3 rad/s and 40 m/s^2 per axis", on(["imu0"], spikes)),
     Alteration("gyro_bias", "gyroscope's bias of 0.05 rad/s in roll and yaw",
