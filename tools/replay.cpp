@@ -33,7 +33,7 @@ class Replay {
   void take(const ImuSample& imu) {
     odometry_.add_imu(imu);
     imu_ns_ = imu.t_ns;
-    while (!waiting_.empty() && imu_ns_ >= std::min(frame_time(), longest_wait())) hand_over();
+    while (!waiting_.empty() && imu_ns_ >= std::min(frame_time(), waits_until())) hand_over();
     if (!waiting_.empty()) return;
     const TimeNs t_ns = step_time(imu.t_ns, odometry_.frame_time(imu.t_ns));
     if (steps_.due(t_ns)) on_frame_({t_ns, odometry_.step(t_ns)});
@@ -42,7 +42,7 @@ class Replay {
   void take(const LaserSample& laser) { odometry_.add_laser(laser); }
   void take(const RecordedFrame& frame) {
     const bool samples_stopped = !waiting_.empty() && waiting_.back().read_ns == imu_ns_;
-    if (samples_stopped) hand_over();
+    if (samples_stopped || waits_too_long(frame.t_ns)) hand_over();
     waiting_.push_back({frame, imu_ns_});
   }
 
@@ -53,17 +53,22 @@ class Replay {
 
   [[nodiscard]] TimeNs frame_time() const { return odometry_.frame_time(waiting_.front().frame.t_ns); }
 
-  /// By then the inertial samples of the oldest frame have come, unless its stamp is wrong.
+  /// For the inertial samples of the oldest frame.
   [[nodiscard]] TimeNs longest_wait() const {
-    const auto& [frame, read_ns] = waiting_.front();
-    const TimeNs learned = duration_ns(later_by(recording_.calibration().camera_time_offset, frame.t_ns), frame_time());
-    return read_ns + kLongestWait + std::max<TimeNs>(0, learned);
+    const TimeNs calibrated = later_by(recording_.calibration().camera_time_offset, waiting_.front().frame.t_ns);
+    return kLongestWait + std::max<TimeNs>(0, duration_ns(calibrated, frame_time()));
+  }
+  /// By then they have come, unless its stamp is wrong.
+  [[nodiscard]] TimeNs waits_until() const { return waiting_.front().read_ns + longest_wait(); }
+  /// Where the inertial samples were set back, another frame shows it.
+  [[nodiscard]] bool waits_too_long(TimeNs next_frame_ns) const {
+    return !waiting_.empty() && duration_ns(waiting_.front().frame.t_ns, next_frame_ns) > longest_wait();
   }
 
   void hand_over() {
     const RecordedFrame& frame = waiting_.front().frame;
     const TimeNs t_ns = frame_time();
-    const bool usable = t_ns <= longest_wait();  // else it is refused
+    const bool usable = t_ns <= waits_until();  // else it is refused
     on_frame_({frame.t_ns, odometry_.add_stereo(frame)});
     if (usable) steps_.saw_frame(t_ns);
     waiting_.pop_front();

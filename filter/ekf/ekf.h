@@ -61,12 +61,6 @@ class Ekf {
   std::optional<TimeNs> propagate(const ImuBuffer& samples, TimeNs t_ns, const ImuNoiseFactors& usual,
                                   double normal_walk);
 
-  /// The gate: one row of ground columns against what the state and its own noise allow.
-  [[nodiscard]] Innovation test(const Eigen::Matrix<double, 1, kGroundColumns>& h, double residual,
-                                double sigma) const {
-    return Innovation::of(residual, covariance_.variance(h, err::nu) + sigma * sigma, gate_.quantile(1));
-  }
-
   /// Updates once with all rows, their noise divided by `weight`. They are whitened in place.
   void apply(GroundRows& z, double weight, CameraUpdate calibration);
 
@@ -143,6 +137,13 @@ class Ekf {
   double turned_ = 0.0;
   Eigen::Vector3d turned_path_ = Eigen::Vector3d::Zero();  ///< integral of turned_ v dt [rad m]
 };
+
+/// The gate: one row of ground columns against what the state and its own noise allow.
+[[nodiscard]] inline Innovation gate_test(const Ekf& ekf, const Eigen::Matrix<double, 1, kGroundColumns>& h,
+                                          double residual, double sigma) {
+  const double variance = ekf.covariance().variance(h, err::nu) + sigma * sigma;
+  return Innovation::of(residual, variance, ekf.gate().quantile(1));
+}
 
 /// Of its state, if there is one.
 [[nodiscard]] inline std::optional<TimeNs> time_of(const Ekf& ekf) {

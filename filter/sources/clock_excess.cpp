@@ -56,7 +56,7 @@ std::optional<ClockExcess::Offset> ClockExcess::offset() const {
 /// What is more than a reading may be late has another cause.
 double ClockExcess::take(double known) {
   const std::optional<Offset> found = offset();
-  if (!found || found->value * found->value <= kClear * kClear * (found->variance + known)) return 0.0;
+  if (!found || !(found->value * found->value > kClear * kClear * (found->variance + known))) return 0.0;
   *this = ClockExcess{};
   const double off = std::abs(found->value);
   return off < kSilent ? off : 0.0;

@@ -1,7 +1,7 @@
 // How noisy the inertial sensors are: at rest by their samples alone, in motion by what they measure between two images
 // of two cameras against what these show, and before that by the images of the start. Vibration, missing samples and
-// wrong stamps make them noisier than their data sheet. And whether a bias jumped, by the same pairs of images.
-// docs/filter.md, "Propagation" and "Gaps and jumps".
+// wrong stamps make them noisier than their data sheet. And whether a bias jumped or a clock is off, by the same pairs
+// of images. docs/filter.md, "Propagation" and "Gaps and jumps".
 #pragma once
 
 #include <Eigen/Core>
@@ -22,8 +22,8 @@ namespace ear {
 
 /// By how much the samples differ from what the images show; 0: not by more than may be.
 struct ImuExcess {
-  double accel = 0.0;  ///< the accelerometer's bias has jumped [m/s^2]
-  double clock = 0.0;  ///< that of the cameras is off [s]
+  double accel = 0.0;  ///< the accelerometer, whose bias has jumped [m/s^2]
+  double clock = 0.0;  ///< their clock from that of the images [s]
 };
 
 class ImuScore {

@@ -57,7 +57,7 @@ GroundRows velocity_row(double residual, double sigma) {
 
 /// One row, if the gate takes it: whether it does.
 bool apply_if_it_fits(Ekf& ekf, GroundRows& z, double weight) {
-  if (!ekf.test(z.H.row(0), z.residual(0), z.sigma(0)).fits) return false;
+  if (!gate_test(ekf, z.H.row(0), z.residual(0), z.sigma(0)).fits) return false;
   ekf.apply(z, weight, CameraUpdate::learned);
   return true;
 }

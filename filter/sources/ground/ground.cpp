@@ -94,7 +94,7 @@ void Ground::stand(const WheelIncrement& increment, const ImuBuffer& imu, Camera
 /// beams contradict it, it is the plane that is wrong, and what pull they keep brings it back.
 Innovation Ground::weigh(GroundRows& z, NoiseScore& score, TimeNs t_ns, const Ekf& ekf) const {
   double& sigma = z.sigma(z.count);
-  Innovation innovation = ekf.test(z.H.row(z.count), z.residual(z.count), sigma);
+  Innovation innovation = gate_test(ekf, z.H.row(z.count), z.residual(z.count), sigma);
   sigma *= std::sqrt(score.add(innovation, sigma, config_.scores, t_ns));
   innovation.score = score.weight();
   return innovation;

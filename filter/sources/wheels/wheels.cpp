@@ -63,7 +63,7 @@ void Wheels::update(const WheelIncrement& stamped, const Context& context, Ekf& 
   for (int row = 0; row < WheelRows::size; ++row) {
     if (!use[static_cast<std::size_t>(row)]) continue;
     if (row != WheelRows::speed) {
-      const Innovation innovation = ekf.test(rows.H.row(row), rows.residual(row), sigma(row));
+      const Innovation innovation = gate_test(ekf, rows.H.row(row), rows.residual(row), sigma(row));
       if (row == WheelRows::slope && !innovation.fits) running_.lifted_ns = increment.to_ns;
       NoiseScore& score = running_.row[static_cast<std::size_t>(row)];
       const double usual = sigma(row);
@@ -179,7 +179,7 @@ void Wheels::score_wheels(WheelRows& rows, Sigmas& sigma, const WheelIncrement& 
     const Eigen::Matrix<double, 1, kGroundColumns> H =
         rows.H.row(WheelRows::speed) + side * rows.H.row(WheelRows::yaw_rate);
     Innovation innovation =
-        ekf.test(H, rows.residual(WheelRows::speed) + side * rows.residual(WheelRows::yaw_rate), noise);
+        gate_test(ekf, H, rows.residual(WheelRows::speed) + side * rows.residual(WheelRows::yaw_rate), noise);
     NoiseScore& score = running_.wheel[i];
     const double factor = score.add(innovation, noise, config_.scores, increment.to_ns);
     information[i] = 1.0 / (1.0 + (factor - 1.0) * readings);
