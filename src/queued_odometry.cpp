@@ -143,7 +143,7 @@ void QueuedOdometry::drop_old_frames() {
   while (2 * imu_.queue.size() > imu_.queue.capacity() && frames_.queue.size() > 1) {
     frames_.queue.pop();
     frames_.overflows.fetch_add(1, std::memory_order_relaxed);
-    hand_over(next_frame_time());
+    hand_over(odometry_.frame_time(frames_.queue.front()->t_ns));
   }
 }
 
@@ -171,7 +171,7 @@ Progress QueuedOdometry::process(std::optional<Estimate>& estimate, QueuedFrame*
     hand_over_samples();
     return Progress::no_frame;
   }
-  const TimeNs frame_ns = next_frame_time();
+  const TimeNs frame_ns = odometry_.frame_time(frame->t_ns);
   hand_over(frame_ns);
   if (newest_imu_ns_ < frame_ns && !frames_.queue.full()) return Progress::no_frame;
   estimate = odometry_.add_stereo(view_of(*frame, cameras_));
@@ -184,7 +184,8 @@ Progress QueuedOdometry::process(std::optional<Estimate>& estimate, QueuedFrame*
 void QueuedOdometry::hand_over_samples() { hand_over(std::numeric_limits<TimeNs>::max()); }
 
 std::optional<TimeNs> QueuedOdometry::next_frame_ns() const {
-  return frames_.queue.front() == nullptr ? std::nullopt : std::optional(next_frame_time());
+  const QueuedFrame* const frame = frames_.queue.front();
+  return frame == nullptr ? std::nullopt : std::optional(odometry_.frame_time(frame->t_ns));
 }
 
 std::optional<Estimate> QueuedOdometry::step(TimeNs t_ns) {

@@ -119,11 +119,6 @@ class QueuedOdometry {
   [[nodiscard]] static TimeNs imu_time(const T* sample, double time_offset = 0.0) {
     return sample == nullptr ? std::numeric_limits<TimeNs>::max() : later_by(time_offset, sample->t_ns);
   }
-  /// Of the oldest frame; the largest number for none.
-  [[nodiscard]] TimeNs next_frame_time() const {
-    const QueuedFrame* const frame = frames_.queue.front();
-    return frame == nullptr ? std::numeric_limits<TimeNs>::max() : odometry_.frame_time(frame->t_ns);
-  }
   void drop_old_frames();
   void hand_over(const ImuSample& sample);
   void hand_over(TimeNs until_ns);

@@ -3,7 +3,6 @@
 #include <sys/resource.h>
 
 #include <deque>
-#include <optional>
 #include <stdexcept>
 #include <utility>
 #include <variant>

@@ -24,7 +24,7 @@ void ImuScore::add_rest(const ImuStatistics& rest, const ImuCalibration& stated)
 
 /// A mean over many frames shows what is too small to be seen in one of them: a bias that jumped. The noise averages
 /// out in it; the bias as the state knows it does not, nor what the errors of the cameras' mounting, focal length and
-/// time offset make look like a turn.
+/// time offset make look like a turn. The same turns show whether the clocks differ.
 std::optional<Innovation> ImuScore::add_excess(const Excess& turn, const ImuMotion& motion, const Covariance& P,
                                                TimeNs t_ns) {
   TurnExcess& e = turn_excess_;
@@ -42,6 +42,7 @@ std::optional<Innovation> ImuScore::add_excess(const Excess& turn, const ImuMoti
   e.rate_B = rate_B;
   e.last_ns = t_ns;
   const double noise = motion.turn_variance * std::pow(learned().gyro, 2);
+  clock_excess_.add({t_ns, dt, rate_B, turn.value / dt, (turn.covariance.trace() / 3.0 + noise) / (dt * dt)});
   Innovation worst;
   for (int axis = 0; axis < 3; ++axis) {
     e.rate(axis) = kept * e.rate(axis) + turn.value(axis) / dt;
@@ -70,11 +71,9 @@ std::optional<Innovation> ImuScore::add(const ImuMotion& motion, const StereoMot
   const Excess turn = turn_beyond(seen, motion.T_BiBj, by_state + by_samples);
   const std::optional<Innovation> excess = add_excess(turn, motion, P, t_ns);
   const double dt = motion.duration;
-  const double turn_noise = motion.turn_variance * std::pow(learned().gyro, 2);
-  clock_excess_.add({t_ns, dt, log_so3(motion.T_BiBj.R) / dt, turn.value / dt,
-                     (turn.covariance.trace() / 3.0 + turn_noise) / (dt * dt)});
   const double rate_variance = P.matrix().diagonal().segment<3>(err::b_g).maxCoeff();
-  const Excess way = way_beyond(seen, motion.T_BiBj, turn_noise + rate_variance * dt * dt);
+  const Excess way =
+      way_beyond(seen, motion.T_BiBj, motion.turn_variance * std::pow(learned().gyro, 2) + rate_variance * dt * dt);
   const Eigen::Matrix3d noise = x.R_WB * (way.covariance + by_samples) * x.R_WB.transpose() / (dt * dt);
   const Eigen::Matrix3d gained = 3.0 / (dt * dt) * x.R_WB * by_samples * x.R_WB.transpose();  // T of T^3 / 3
   accel_excess_.add({t_ns, dt, x.v_W, motion.gained_W, gained.diagonal(), x.R_WB * way.value / dt, noise.diagonal()},
