@@ -48,9 +48,7 @@ void Filter::propagate_to(const FeatureFrame& frame) {
   const TimeNs t_ns = begin_frame(frame);
   if (ekf_.running()) {
     consistency_ = consistency_check_(sources_.displacements(frame, t_ns, ingest_, ekf_, sources_.ground().known()));
-    const ImuExcess excess = sources_.score_imu(frame, ekf_, records_);
-    take_in_accel_jump(excess.accel);
-    if (config_.online_calibration.time_offset && excess.clock > 0.0) ekf_.inflate_clock(excess.clock);
+    take_in(sources_.score_imu(frame, ekf_, records_));
     sources_.advance(t_ns, advice(), ingest_, ekf_, records_);
   }
   if (!ekf_.running() || health_.lost()) {
@@ -70,10 +68,14 @@ void Filter::watch_biases() {
 }
 
 /// What is more than any bias has another cause: sensors that are mounted elsewhere, clocks that differ.
-void Filter::take_in_accel_jump(double accel) {
-  if (accel == 0.0) return;
-  const bool bias = accel < std::sqrt(kFarthest) * config_.prior.accel_bias;
-  take_in({0.0, bias ? accel : 0.0, {false, true}}, ekf_.state().imu.t_ns);
+void Filter::take_in(const ImuExcess& excess) {
+  const double farthest = std::sqrt(kFarthest);
+  BiasJump jump;
+  jump.fault = {excess.gyro > 0.0, excess.accel > 0.0};
+  if (excess.gyro < kClear * config_.prior.gyro_bias) jump.gyro = excess.gyro;
+  if (excess.accel < farthest * config_.prior.accel_bias) jump.accel = excess.accel;
+  if (jump.fault.any()) take_in(jump, ekf_.state().imu.t_ns);
+  if (config_.online_calibration.time_offset && excess.clock > 0.0) ekf_.inflate_clock(excess.clock);
 }
 
 /// A bias that jumped took the motion along until it was found out, for as long as the watch remembers. Both are less

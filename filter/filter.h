@@ -33,7 +33,7 @@ class Filter final : public CommonEstimator {
  private:
   void propagate_to(const FeatureFrame& frame);
   void watch_biases();
-  void take_in_accel_jump(double accel);
+  void take_in(const ImuExcess& excess);
   void take_in(const BiasJump& jump, TimeNs t_ns);
   void start(const FeatureFrame& frame);
   void stop();

@@ -9,14 +9,14 @@ namespace ear {
 
 /// The angular acceleration in the middle of two frames is by what the rate changes from those before to those after:
 /// so each is counted when the next comes.
-void ClockExcess::add(const Frame& frame) {
-  const double dt = last_.t_ns ? seconds_between(last_.t_ns, frame.t_ns) : INFINITY;
+void ClockExcess::add(const SeenTurn& turn) {
+  const double dt = last_.t_ns ? seconds_between(last_.t_ns, turn.t_ns) : INFINITY;
   if (!(dt > 0.0 && dt < kStreamMemory)) *this = ClockExcess{};
-  const bool next = std::abs(dt - frame.duration) < kPrecise * frame.duration;
+  const bool next = std::abs(dt - turn.duration) < kPrecise * turn.duration;
   in_a_row_ = next ? in_a_row_ + 1 : 0;
-  if (in_a_row_ > 1 && frame.rate_B.allFinite() && last_.beyond_B.allFinite() && last_.variance > 0.0) {
-    const double between = last_.duration + 0.5 * (frame.duration + before_.duration);
-    const Eigen::Vector3d accel = (frame.rate_B - before_.rate_B) / between;
+  if (in_a_row_ > 1 && turn.rate_B.allFinite() && last_.beyond_B.allFinite() && last_.variance > 0.0) {
+    const double between = last_.duration + 0.5 * (turn.duration + before_.duration);
+    const Eigen::Vector3d accel = (turn.rate_B - before_.rate_B) / between;
     const Vector4 usual(1.0, last_.rate_B.x(), last_.rate_B.y(), last_.rate_B.z());
     const double exactness = 1.0 / last_.variance;
     const double kept = std::exp(-dt / kStreamMemory);
@@ -31,7 +31,7 @@ void ClockExcess::add(const Frame& frame) {
     span_ += dt;
   }
   before_ = last_;
-  last_ = frame;
+  last_ = turn;
 }
 
 /// Least squares. A bias of the gyroscope is a constant; its scales and axes, where the cameras point and their focal

@@ -5,21 +5,13 @@
 #include <Eigen/Core>
 #include <optional>
 
-#include "ear/types.h"
+#include "filter/sources/seen_turn.h"
 
 namespace ear {
 
 class ClockExcess {
  public:
-  /// Two stereo frames. Vectors are in B.
-  struct Frame {
-    TimeNs t_ns = 0;                                     ///< of the later one
-    double duration = 0.0;                               ///< [s], more than 0
-    Eigen::Vector3d rate_B = Eigen::Vector3d::Zero();    ///< the gyroscope's, the mean [rad/s]
-    Eigen::Vector3d beyond_B = Eigen::Vector3d::Zero();  ///< by how much faster the images show it to be [rad/s]
-    double variance = 1.0;                               ///< of that, one axis, by noise
-  };
-  void add(const Frame& frame);
+  void add(const SeenTurn& turn);
 
   /// By how much later the images seem to be taken than is thought [s], and the variance of that.
   struct Offset {
@@ -46,7 +38,7 @@ class ClockExcess {
 
   Sums sums_;
   double span_ = 0.0;  ///< [s] of the sums
-  Frame last_, before_;
+  SeenTurn last_, before_;
   int in_a_row_ = 0;
 };
 

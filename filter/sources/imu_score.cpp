@@ -55,7 +55,24 @@ std::optional<Innovation> ImuScore::add_excess(const Excess& turn, const ImuMoti
   return worst;
 }
 
-std::optional<Innovation> ImuScore::add(const ImuMotion& motion, const StereoMotion& images, const ImuState& x,
+/// Where the images contradict the displacement too, which is known to within `predicted`, it is less certain by so
+/// much, and that it is off, frames share: the accelerometer may be to blame. By ten times, something else moves. The
+/// noise is that at rest: what is learned takes a jump for noise.
+void ImuScore::add_bias(const StereoMotion& seen, const ImuMotion& motion, const Eigen::Matrix3d& predicted,
+                        const State& x, const Covariance& P, TimeNs t_ns) {
+  const Eigen::Vector3d shift = seen.T_B0B1.p - motion.T_BiBj.p;
+  const double misfit = shift.dot((predicted + seen.p_covariance()).ldlt().solve(shift));
+  if (!(misfit < kFarthest)) return;
+  const Excess turn = turn_beyond(seen, motion.T_BiBj, std::max(1.0, misfit) * predicted);
+  const double dt = motion.duration;
+  const double shared = turn.by_prediction.trace() / 3.0;
+  const double noise = turn.covariance.trace() / 3.0 - shared + motion.turn_variance * at_rest_.gyro * at_rest_.gyro;
+  const Eigen::Vector3d rate_B = log_so3(motion.T_BiBj.R) / dt;
+  const SeenTurn seen_turn{t_ns, dt, rate_B, turn.value / dt, noise / (dt * dt)};
+  gyro_excess_.add({seen_turn, shared / (dt * dt), x.imu.b_g, x.camera.time_offset}, P);
+}
+
+std::optional<Innovation> ImuScore::add(const ImuMotion& motion, const StereoMotion& images, const State& x,
                                         const Covariance& P, TimeNs t_ns) {
   if (!(motion.duration > 0.0) || images.fitting < kStill * images.matches) return std::nullopt;
   StereoMotion seen = images;
@@ -69,14 +86,16 @@ std::optional<Innovation> ImuScore::add(const ImuMotion& motion, const StereoMot
   }
   const Eigen::Matrix3d by_samples = motion.covariance * std::pow(learned().accel, 2);
   const Excess turn = turn_beyond(seen, motion.T_BiBj, by_state + by_samples);
+  add_bias(seen, motion, by_state + by_samples, x, P, t_ns);
   const std::optional<Innovation> excess = add_excess(turn, motion, P, t_ns);
   const double dt = motion.duration;
   const double rate_variance = P.matrix().diagonal().segment<3>(err::b_g).maxCoeff();
   const Excess way =
       way_beyond(seen, motion.T_BiBj, motion.turn_variance * std::pow(learned().gyro, 2) + rate_variance * dt * dt);
-  const Eigen::Matrix3d noise = x.R_WB * (way.covariance + by_samples) * x.R_WB.transpose() / (dt * dt);
-  const Eigen::Matrix3d gained = 3.0 / (dt * dt) * x.R_WB * by_samples * x.R_WB.transpose();  // T of T^3 / 3
-  accel_excess_.add({t_ns, dt, x.v_W, motion.gained_W, gained.diagonal(), x.R_WB * way.value / dt, noise.diagonal()},
+  const Eigen::Matrix3d& R_WB = x.imu.R_WB;
+  const Eigen::Matrix3d noise = R_WB * (way.covariance + by_samples) * R_WB.transpose() / (dt * dt);
+  const Eigen::Matrix3d gained = 3.0 / (dt * dt) * R_WB * by_samples * R_WB.transpose();  // T of T^3 / 3
+  accel_excess_.add({t_ns, dt, x.imu.v_W, motion.gained_W, gained.diagonal(), R_WB * way.value / dt, noise.diagonal()},
                     P);
   for (int axis = 0; axis < 3; ++axis) {
     const double bias = P.matrix()(err::b_g + axis, err::b_g + axis) * dt * dt;

@@ -17,12 +17,14 @@
 #include "filter/sources/accel_excess.h"
 #include "filter/sources/cameras/stereo_motion.h"
 #include "filter/sources/clock_excess.h"
+#include "filter/sources/gyro_excess.h"
 
 namespace ear {
 
 /// By how much the samples differ from what the images show; 0: not by more than may be.
 struct ImuExcess {
-  double accel = 0.0;  ///< the accelerometer, whose bias has jumped [m/s^2]
+  double gyro = 0.0;   ///< the gyroscope, whose bias has jumped [rad/s]
+  double accel = 0.0;  ///< the same of the accelerometer [m/s^2]
   double clock = 0.0;  ///< their clock from that of the images [s]
 };
 
@@ -41,11 +43,12 @@ class ImuScore {
   /// The motion from the state `x` to a frame at `t_ns` by the inertial samples, and as the images show it. `P`: of the
   /// state's error. By how much the cameras turned faster than the gyroscope of late [rad/s], in the mean, about the
   /// axis where it is least likely; nothing if the images show too little.
-  std::optional<Innovation> add(const ImuMotion& motion, const StereoMotion& images, const ImuState& x,
+  std::optional<Innovation> add(const ImuMotion& motion, const StereoMotion& images, const State& x,
                                 const Covariance& P, TimeNs t_ns);
-  /// AccelExcess::take and ClockExcess::take, of the same frames.
+  /// What the same frames show.
   ImuExcess take_excess(const Covariance& P) {
-    return {accel_excess_.take(P), clock_excess_.take(P.matrix()(err::time_offset, err::time_offset))};
+    return {gyro_excess_.take(P), accel_excess_.take(P),
+            clock_excess_.take(P.matrix()(err::time_offset, err::time_offset))};
   }
 
   /// Factors on the noise of all samples, 1 or more.
@@ -66,6 +69,8 @@ class ImuScore {
     std::optional<TimeNs> last_ns;
   };
   std::optional<Innovation> add_excess(const Excess& turn, const ImuMotion& motion, const Covariance& P, TimeNs t_ns);
+  void add_bias(const StereoMotion& seen, const ImuMotion& motion, const Eigen::Matrix3d& predicted, const State& x,
+                const Covariance& P, TimeNs t_ns);
 
   bool adapts_;
   ImuNoiseFactors at_rest_;  ///< on the stated noise, when it last stood or started
@@ -73,6 +78,7 @@ class ImuScore {
   TurnExcess turn_excess_;
   AccelExcess accel_excess_;
   ClockExcess clock_excess_;
+  GyroExcess gyro_excess_;
   NoiseScore gyro_{kStreamMemory, kFarthest}, accel_{kStreamMemory, kFarthest};
 };
 

@@ -83,9 +83,9 @@ Displacements Sources::displacements(const FeatureFrame& frame, TimeNs t_ns, con
 ImuExcess Sources::score_imu(const FeatureFrame& frame, const Ekf& ekf, Records& records) {
   const std::optional<StereoMotion>& seen = cameras_.seen();
   if (!seen) return {};
-  const ImuState& x = ekf.state().imu;
+  const State& x = ekf.state();
   const std::optional<Innovation> turn = imu_score_.add(motion_, *seen, x, ekf.covariance(), frame.t_ns);
-  if (turn) records.log.add(Source::gyroscope, *turn, x.t_ns);
+  if (turn) records.log.add(Source::gyroscope, *turn, x.imu.t_ns);
   return imu_score_.take_excess(ekf.covariance());
 }
 

@@ -4,56 +4,15 @@
 
 #include <cmath>
 #include <limits>
-#include <random>
 
 #include "filter/ingest/limits.h"
+#include "tests/support/turning_rig.h"
 
 using namespace ear;
 
 namespace {
 
-constexpr double kSigma = 0.02;  // [rad/s] of a turn by two images
-
-/// A body that sways about all axes, and cameras that see it turn.
-struct Rig {
-  double late = 0.0;                               ///< [s] the images are taken after their stamps
-  double dt = 1.0 / 30.0;                          ///< [s] from frame to frame
-  double noise = 1.0;                              ///< times what is stated
-  Eigen::Vector3d bias = Eigen::Vector3d::Zero();  ///< [rad/s] of the gyroscope
-  Eigen::Matrix3d axes = Eigen::Matrix3d::Zero();  ///< what is measured of the rate besides itself
-  double size = 0.3;                               ///< [rad/s]
-
-  explicit Rig(unsigned seed) : rng_(seed) {
-    std::uniform_real_distribution<double> phase(0.0, 6.28);
-    for (int i = 0; i < 3; ++i) phase_(i) = phase(rng_);
-  }
-
-  /// [rad]: its derivative sways with 0.3 to 1.1 Hz.
-  [[nodiscard]] Eigen::Vector3d angle(double t) const {
-    const Eigen::Array3d frequency(1.9, 4.3, 7.0);  // [rad/s]
-    return (size / frequency * (frequency * t + phase_).sin()).matrix();
-  }
-
-  ClockExcess::Frame next() {
-    std::normal_distribution<double> normal(0.0, noise * kSigma);
-    const double t = dt * ++steps_;
-    const auto rate = [&](double at) { return Eigen::Vector3d((angle(at) - angle(at - dt)) / dt); };
-    ClockExcess::Frame frame;
-    frame.t_ns = static_cast<TimeNs>(1e9 * t);
-    frame.duration = dt;
-    frame.rate_B = rate(t) + axes * rate(t) + bias;
-    frame.beyond_B = rate(t + late) - frame.rate_B + Eigen::Vector3d::NullaryExpr([&] { return normal(rng_); });
-    frame.variance = kSigma * kSigma;
-    return frame;
-  }
-
- private:
-  std::mt19937_64 rng_;
-  int steps_ = 0;
-  Eigen::Array3d phase_ = Eigen::Array3d::Zero();
-};
-
-ClockExcess seen(Rig& rig, int frames) {
+ClockExcess seen(TurningRig& rig, int frames) {
   ClockExcess excess;
   for (int i = 0; i < frames; ++i) excess.add(rig.next());
   return excess;
@@ -65,7 +24,7 @@ struct Found {
   int frames = 0;
 };
 
-Found find(Rig rig, int frames, double known = 4e-6) {
+Found find(TurningRig rig, int frames, double known = 4e-6) {
   ClockExcess excess;
   for (int i = 1; i <= frames; ++i) {
     excess.add(rig.next());
@@ -83,7 +42,7 @@ TEST_CASE("clock excess: the offset is by how much later the images are, to with
     double mean = 0.0, squares = 0.0;
     constexpr int kRuns = 400;
     for (unsigned seed = 0; seed < kRuns; ++seed) {
-      Rig rig(seed);
+      TurningRig rig(seed);
       rig.late = late;
       rig.axes = 0.05 * Eigen::Matrix3d::Random();
       rig.bias = {0.1, -0.2, 0.3};
@@ -105,7 +64,7 @@ TEST_CASE(
     CAPTURE(seed);
     for (const double dt : {1.0 / 30.0, 0.1}) {
       for (const double late : {0.06, -0.06}) {
-        Rig rig(seed);
+        TurningRig rig(seed);
         rig.dt = dt;
         rig.late = late;
         const Found found = find(rig, static_cast<int>(4.0 / dt));
@@ -119,15 +78,15 @@ TEST_CASE(
 TEST_CASE("clock excess: sound clocks, a bias, and sensors that point elsewhere are none") {
   for (unsigned seed = 1; seed <= 20; ++seed) {
     CAPTURE(seed);
-    CHECK(find(Rig(seed), 3000).frames == 0);
-    Rig noisy(seed);
+    CHECK(find(TurningRig(seed), 3000).frames == 0);
+    TurningRig noisy(seed);
     noisy.noise = 8.0;
     CHECK(find(noisy, 3000).frames == 0);
-    Rig turned(seed);
+    TurningRig turned(seed);
     turned.bias = {0.5, -0.5, 0.5};
     turned.axes << 0.0, -1.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, 0.1;
     CHECK(find(turned, 3000).frames == 0);
-    Rig still(seed);
+    TurningRig still(seed);
     still.size = 0.0;
     still.late = 0.1;
     CHECK(find(still, 3000).frames == 0);  // nothing shows it
@@ -135,7 +94,7 @@ TEST_CASE("clock excess: sound clocks, a bias, and sensors that point elsewhere 
 }
 
 TEST_CASE("clock excess: what the state does not know of the clock, and what no reading is late by, are none") {
-  Rig late(3);
+  TurningRig late(3);
   late.late = 0.03;
   CHECK(find(late, 300).frames > 0);
   CHECK(find(late, 300, 0.01 * 0.01).frames == 0);
@@ -144,19 +103,19 @@ TEST_CASE("clock excess: what the state does not know of the clock, and what no 
 }
 
 TEST_CASE("clock excess: only frames that follow each other count, and what is no number is left out") {
-  Rig rig(5);
+  TurningRig rig(5);
   rig.late = 0.05;
   ClockExcess excess;
   for (int i = 0; i < 600; ++i) {
-    const ClockExcess::Frame frame = rig.next();
+    const SeenTurn frame = rig.next();
     if (i % 3 != 2) excess.add(frame);  // of three, the last is always missing
   }
   CHECK_FALSE(excess.offset());
-  Rig whole(5);
+  TurningRig whole(5);
   whole.late = 0.05;
   ClockExcess other;
   for (int i = 0; i < 90; ++i) {
-    ClockExcess::Frame frame = whole.next();
+    SeenTurn frame = whole.next();
     if (i % 20 == 7) frame.beyond_B.y() = std::numeric_limits<double>::quiet_NaN();
     if (i % 20 == 13) frame.variance = 0.0;
     other.add(frame);

@@ -73,7 +73,7 @@ Judged judged_after(double seconds, const Rig& rig, unsigned seed) {
     images.T_B0B1.p = off.tail<3>();
     images.covariance = C;
     images.matches = images.fitting = 100;
-    const std::optional<Innovation> excess = judged.score.add(motion, images, ImuState{}, P, t_ns);
+    const std::optional<Innovation> excess = judged.score.add(motion, images, State{}, P, t_ns);
     REQUIRE(excess);
     ++(excess->fits ? judged.fit : judged.unfit);
   }
@@ -130,10 +130,10 @@ TEST_CASE("imu score: one image that is wrong changes little, and those in which
   images.matches = 100;
   images.fitting = 80;
   const double before = gyro_score(score);
-  (void)score.add(motion, images, ImuState{}, P, 10 * 1'000'000'000LL);
+  (void)score.add(motion, images, State{}, P, 10 * 1'000'000'000LL);
   CHECK(gyro_score(score) == before);
   images.fitting = 100;
-  (void)score.add(motion, images, ImuState{}, P, 10 * 1'000'000'000LL);
+  (void)score.add(motion, images, State{}, P, 10 * 1'000'000'000LL);
   CHECK(gyro_score(score) < before);
   CHECK(gyro_score(score) > 0.5);
 }

@@ -150,6 +150,7 @@ class Hop(unittest.TestCase):
         "imu_bursts": 0.012,  # what moves as before between two samples
         "wheels_lost": 0.012,
         "camera_third": 0.02,
+        "gyro_jump": 0.01,  # 0.7 m where the bias is not found
         "gyro_scale": 0.01,  # 22 mm where the scale is no state
         "gyro_axes": 0.01,  # 11.7 mm where it is no state where they point
         "accel_axes": 0.0095,  # 10.3 mm where it is no state what they measure

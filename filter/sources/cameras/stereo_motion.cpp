@@ -129,7 +129,7 @@ Excess beyond(const StereoMotion& seen, const Pose& T_B0B1, int begin, const Eig
   const Eigen::LDLT<Eigen::Matrix3d> ldlt(seen.covariance.block<3, 3>(other, other) + covariance);
   const Eigen::Matrix3d gain = ldlt.solve(across.transpose()).transpose();
   return {excess.segment<3>(begin) - gain * excess.segment<3>(other),
-          seen.covariance.block<3, 3>(begin, begin) - gain * across.transpose()};
+          seen.covariance.block<3, 3>(begin, begin) - gain * across.transpose(), gain * covariance * gain.transpose()};
 }
 
 }  // namespace

@@ -63,6 +63,7 @@ struct StereoMotion {
 struct Excess {
   Eigen::Vector3d value = Eigen::Vector3d::Zero();
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();
+  Eigen::Matrix3d by_prediction = Eigen::Matrix3d::Zero();  ///< its part by what was predicted, which frames may share
 };
 /// What the images show of the turn if the displacement is as predicted, to within `p_covariance`. Alone, a fit takes
 /// some of the displacement for a turn, since the depths are noisy.
