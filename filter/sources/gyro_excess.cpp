@@ -6,6 +6,7 @@
 #include "filter/sources/cameras/stereo_motion.h"
 
 namespace ear {
+
 /// The bias walks by as much as makes it follow within kStale, and not while nothing is seen: one frame would be enough
 /// then. A calibration may be wrong by four times what it says. What the state has learned meanwhile is no longer
 /// beyond it.
@@ -13,7 +14,7 @@ void GyroExcess::add(const Frame& frame, const Covariance& P) {
   const SeenTurn& turn = frame.turn;
   const double b_g_variance = P.matrix().diagonal().segment<3>(err::b_g).maxCoeff();
   const bool finite = turn.rate_B.allFinite() && turn.beyond_B.allFinite() && frame.b_g.allFinite();
-  if (!finite || !(turn.variance > 0.0) || !(b_g_variance > 0.0)) return;
+  if (!finite || !(turn.variance > 0.0) || !(b_g_variance >= 0.0)) return;
   const double dt = last_.turn.t_ns ? seconds_between(last_.turn.t_ns, turn.t_ns) : INFINITY;
   const double variance = turn.variance / std::pow(unexplained_.weight(), 2);
   if (!(dt > 0.0 && dt < kLostAfter)) {

@@ -149,6 +149,21 @@ TEST_CASE("imu score: a bias of the gyroscope that no single image shows is foun
   }
 }
 
+TEST_CASE("imu score: a bias of the gyroscope that jumps is found, but not where something else moves") {
+  Covariance P(err::clones);
+  P.reset(Eigen::VectorXd::Zero(err::clones));
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    CAPTURE(seed);
+    CHECK(judged_after(10.0, {}, seed).score.take_excess(P).gyro == 0.0);
+    Rig biased;
+    biased.gyro_bias = 0.02;
+    CHECK(judged_after(2.0, biased, seed).score.take_excess(P).gyro == doctest::Approx(0.02).epsilon(0.1));
+    Rig moving = biased;
+    moving.shift = 0.1;  // the images show another displacement than the samples
+    CHECK(judged_after(2.0, moving, seed).score.take_excess(P).gyro == 0.0);
+  }
+}
+
 TEST_CASE("imu score: nor is it a fault what the cameras' mounting and time offset make of a turn") {
   Rig turning;
   turning.gyro_bias = 0.01;

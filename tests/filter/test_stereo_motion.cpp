@@ -1,6 +1,7 @@
 // Motion between two frames from stereo features, and whether frames agree with a motion.
 #include <doctest/doctest.h>
 
+#include <Eigen/Eigenvalues>
 #include <random>
 
 #include "filter/ekf/so3.h"
@@ -224,6 +225,27 @@ TEST_CASE("frame check: what moves a little more than predicted shows in the way
   CHECK((draws.mean - more).norm() < 2e-3);
   CHECK(draws.squares > 1.5);
   CHECK(draws.squares < 9.0);  // 3 times what ImuScore multiplies the covariance by
+}
+
+TEST_CASE("frame check: a displacement that is predicted wrongly shows as a turn, as often as is stated") {
+  const Pair pair = look(exp_so3(kTurn), 0.2 * kWay, kSigma, 1);
+  const auto motion = stereo_motion(matched(pair), cameras(), Pose{}, kSigma);
+  REQUIRE(motion);
+  constexpr double kOff = 0.02;  // [m] standard deviation, each axis
+  const Eigen::Matrix3d known = Eigen::Matrix3d::Identity() * kOff * kOff;
+  const Excess right = turn_beyond(*motion, {exp_so3(kTurn), 0.2 * kWay}, known);
+  std::mt19937_64 rng{2};
+  std::normal_distribution<double> normal(0.0, kOff);
+  constexpr int kDraws = 4000;
+  Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
+  for (int i = 0; i < kDraws; ++i) {
+    const Eigen::Vector3d off = Eigen::Vector3d::NullaryExpr([&] { return normal(rng); });
+    const Excess wrong = turn_beyond(*motion, {exp_so3(kTurn), 0.2 * kWay + off}, known);
+    scatter += (wrong.value - right.value) * (wrong.value - right.value).transpose() / kDraws;
+  }
+  CHECK((scatter - right.by_prediction).norm() < 0.1 * scatter.norm());
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> rest(right.covariance - right.by_prediction);
+  CHECK(rest.eigenvalues().minCoeff() > 0.0);
 }
 
 TEST_CASE("frame check: swapped images are seen at once") {
