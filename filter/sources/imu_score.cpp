@@ -61,9 +61,10 @@ std::optional<Innovation> ImuScore::add_excess(const Excess& turn, const ImuMoti
 void ImuScore::add_bias(const StereoMotion& seen, const ImuMotion& motion, const Eigen::Matrix3d& predicted,
                         const State& x, const Covariance& P, TimeNs t_ns) {
   const Eigen::Vector3d shift = seen.T_B0B1.p - motion.T_BiBj.p;
-  const double misfit = shift.dot((predicted + seen.p_covariance()).ldlt().solve(shift));
+  const Eigen::Matrix3d expected = predicted + seen.p_covariance();
+  const double misfit = shift.dot(expected.ldlt().solve(shift));
   if (!(misfit < kFarthest)) return;
-  const Excess turn = turn_beyond(seen, motion.T_BiBj, std::max(1.0, misfit) * predicted);
+  const Excess turn = turn_beyond(seen, motion.T_BiBj, predicted + std::max(0.0, misfit / 3.0 - 1.0) * expected);
   const double dt = motion.duration;
   const double shared = turn.by_prediction.trace() / 3.0;
   const double noise = turn.covariance.trace() / 3.0 - shared + motion.turn_variance * at_rest_.gyro * at_rest_.gyro;
