@@ -61,13 +61,16 @@ std::optional<Innovation> ImuScore::add_excess(const Excess& turn, const ImuMoti
 void ImuScore::add_bias(const StereoMotion& seen, const ImuMotion& motion, const Eigen::Matrix3d& predicted,
                         const State& x, const Covariance& P, TimeNs t_ns) {
   const Eigen::Vector3d shift = seen.T_B0B1.p - motion.T_BiBj.p;
-  const Eigen::Matrix3d expected = predicted + seen.p_covariance();
-  const double misfit = shift.dot(expected.ldlt().solve(shift));
+  const double misfit = shift.dot((predicted + seen.p_covariance()).ldlt().solve(shift));
   if (!(misfit < kFarthest)) return;
-  const Excess turn = turn_beyond(seen, motion.T_BiBj, predicted + std::max(0.0, misfit / 3.0 - 1.0) * expected);
+  const Excess turn = turn_beyond(seen, motion.T_BiBj, std::max(1.0, misfit) * predicted);
+  const Eigen::Vector3d by_shift = log_so3(motion.T_BiBj.R.transpose() * seen.T_B0B1.R) - turn.value;
+  const double contradicted = std::max(0.0, 1.0 - 3.0 / misfit);  // the share that is no chance
   const double dt = motion.duration;
-  const double shared = turn.by_prediction.trace() / 3.0;
-  const double noise = turn.covariance.trace() / 3.0 - shared + motion.turn_variance * at_rest_.gyro * at_rest_.gyro;
+  const double predictable = turn.by_prediction.trace() / 3.0;
+  const double shared = predictable + contradicted * by_shift.squaredNorm() / 3.0;
+  const double noise =
+      turn.covariance.trace() / 3.0 - predictable + motion.turn_variance * at_rest_.gyro * at_rest_.gyro;
   const Eigen::Vector3d rate_B = log_so3(motion.T_BiBj.R) / dt;
   const SeenTurn seen_turn{t_ns, dt, rate_B, turn.value / dt, noise / (dt * dt)};
   gyro_excess_.add({seen_turn, shared / (dt * dt), x.imu.b_g, x.camera.time_offset}, P);
