@@ -7,8 +7,10 @@
 #include <random>
 
 #include "filter/ekf/so3.h"
+#include "tests/support/about.h"
 
 using namespace ear;
+using ear::test::about;
 
 namespace {
 
@@ -157,7 +159,7 @@ TEST_CASE("imu score: a bias of the gyroscope that jumps is found, but not where
     CHECK(judged_after(10.0, {}, seed).score.take_excess(P).gyro == 0.0);
     Rig biased;
     biased.gyro_bias = 0.02;
-    CHECK(judged_after(2.0, biased, seed).score.take_excess(P).gyro == doctest::Approx(0.02).epsilon(0.1));
+    CHECK(judged_after(2.0, biased, seed).score.take_excess(P).gyro == about(0.02, 0.1));
     Rig moving = biased;
     moving.shift = 0.1;  // the images show another displacement than the samples
     CHECK(judged_after(2.0, moving, seed).score.take_excess(P).gyro == 0.0);
