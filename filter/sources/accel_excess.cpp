@@ -17,7 +17,7 @@ void AccelExcess::Sums::age(double dt, double kept) {
 /// the samples alone. So the line ends where the samples between two frames are not known.
 void AccelExcess::add(const Frame& frame, const Covariance& P) {
   const double dt = last_.t_ns ? seconds_between(last_.t_ns, frame.t_ns) : INFINITY;
-  const bool next = std::abs(dt - frame.duration) < kPrecise * frame.duration;
+  const bool next = follows(dt, frame.duration);
   if (!next) *this = AccelExcess{};
   if (!frame.beyond_W.allFinite() || !frame.v_W.allFinite() || !frame.gained_W.allFinite()) return;
   const Eigen::Vector3d accel_W = frame.gained_W / frame.duration;

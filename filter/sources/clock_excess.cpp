@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "filter/ingest/limits.h"
+#include "filter/sources/cameras/stereo_motion.h"
 
 namespace ear {
 
@@ -12,7 +13,7 @@ namespace ear {
 void ClockExcess::add(const SeenTurn& turn) {
   const double dt = last_.t_ns ? seconds_between(last_.t_ns, turn.t_ns) : INFINITY;
   if (!(dt > 0.0 && dt < kStreamMemory)) *this = ClockExcess{};
-  const bool next = std::abs(dt - turn.duration) < kPrecise * turn.duration;
+  const bool next = follows(dt, turn.duration);
   in_a_row_ = next ? in_a_row_ + 1 : 0;
   if (in_a_row_ > 1 && turn.rate_B.allFinite() && last_.beyond_B.allFinite() && last_.variance > 0.0) {
     const double between = last_.duration + 0.5 * (turn.duration + before_.duration);

@@ -19,8 +19,7 @@ void GyroExcess::add(const Frame& frame, const Covariance& P) {
   const double variance = turn.variance / std::pow(unexplained_.weight(), 2);
   if (!(dt > 0.0 && dt < kLostAfter)) {
     *this = GyroExcess{};
-    const double gyro_matrix = P.matrix()(err::gyro_matrix, err::gyro_matrix);
-    const double by_rate = gyro_matrix + apparent_variance(P, Eigen::Vector3d::UnitX(), Eigen::Vector3d::Zero());
+    const double by_rate = apparent_turn_variance(P, Eigen::Vector3d::UnitX(), Eigen::Vector3d::Zero());
     Vector7 prior;
     prior << b_g_variance, Eigen::Vector3d::Constant(kClear * kClear * by_rate),
         Eigen::Vector3d::Constant(kSilent * kSilent);
@@ -30,7 +29,7 @@ void GyroExcess::add(const Frame& frame, const Covariance& P) {
     x_.bottomRows<3>().diagonal().array() -= frame.time_offset - last_.time_offset;
     P_(0, 0) += variance * std::pow(turn.duration / kStale, 2);
   }
-  if (std::abs(dt - turn.duration) < kPrecise * turn.duration) {
+  if (follows(dt, turn.duration)) {
     Vector7 H;
     H << 1.0, turn.rate_B, (turn.rate_B - last_.turn.rate_B) / dt;
     const Vector7 PH = P_ * H;

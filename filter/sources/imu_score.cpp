@@ -25,20 +25,18 @@ void ImuScore::add_rest(const ImuStatistics& rest, const ImuCalibration& stated)
 /// A mean over many frames shows what is too small to be seen in one of them: a bias that jumped. The noise averages
 /// out in it; the bias as the state knows it does not, nor what the errors of the cameras' mounting, focal length and
 /// time offset make look like a turn. The same turns show whether the clocks differ.
-std::optional<Innovation> ImuScore::add_excess(const Excess& turn, const ImuMotion& motion, const Covariance& P,
-                                               TimeNs t_ns) {
+std::optional<Innovation> ImuScore::add_excess(const Excess& turn, const ImuMotion& motion,
+                                               const Eigen::Vector3d& rate_B, const Covariance& P, TimeNs t_ns) {
   TurnExcess& e = turn_excess_;
   const double dt = motion.duration;
   if (!turn.value.allFinite() || !turn.covariance.allFinite() || !P.matrix().diagonal().allFinite())
     return std::nullopt;
   const double since = e.last_ns ? seconds_between(*e.last_ns, t_ns) : kStale;
   const auto variance = [&P](int entry) { return std::max(0.0, P.matrix()(entry, entry)); };
-  const Eigen::Vector3d rate_B = log_so3(motion.T_BiBj.R) / dt;
   const Eigen::Vector3d change = since < kStale ? Eigen::Vector3d((rate_B - e.rate_B) / dt) : Eigen::Vector3d::Zero();
   const double kept = std::exp(-std::max(0.0, since) / kStale);
   e.count = kept * e.count + 1.0;
-  e.apparent =
-      kept * e.apparent + apparent_variance(P, rate_B, change) + rate_B.squaredNorm() * variance(err::gyro_matrix);
+  e.apparent = kept * e.apparent + apparent_turn_variance(P, rate_B, change);
   e.rate_B = rate_B;
   e.last_ns = t_ns;
   const double noise = motion.turn_variance * std::pow(learned().gyro, 2);
@@ -55,23 +53,21 @@ std::optional<Innovation> ImuScore::add_excess(const Excess& turn, const ImuMoti
   return worst;
 }
 
-/// Where the images contradict the displacement too, which is known to within `predicted`, it is less certain by so
-/// much, and that it is off, frames share: the accelerometer may be to blame. By ten times, something else moves. The
-/// noise is that at rest: what is learned takes a jump for noise.
-void ImuScore::add_bias(const StereoMotion& seen, const ImuMotion& motion, const Eigen::Matrix3d& predicted,
-                        const State& x, const Covariance& P, TimeNs t_ns) {
+/// Where the images contradict the displacement too, it is less certain by so much, and that it is off, frames share:
+/// the accelerometer may be to blame. By ten standard deviations, something else moves. The noise is that at rest: what
+/// is learned takes a jump for noise.
+void ImuScore::add_bias(const StereoMotion& seen, const ImuMotion& motion, const Eigen::Vector3d& rate_B,
+                        const Eigen::Matrix3d& p_covariance, const State& x, const Covariance& P, TimeNs t_ns) {
   const Eigen::Vector3d shift = seen.T_B0B1.p - motion.T_BiBj.p;
-  const double misfit = shift.dot((predicted + seen.p_covariance()).ldlt().solve(shift));
+  const double misfit = shift.dot((p_covariance + seen.p_covariance()).ldlt().solve(shift));
   if (!(misfit < kFarthest)) return;
-  const Excess turn = turn_beyond(seen, motion.T_BiBj, std::max(1.0, misfit) * predicted);
-  const Eigen::Vector3d by_shift = log_so3(motion.T_BiBj.R.transpose() * seen.T_B0B1.R) - turn.value;
+  const Excess turn = turn_beyond(seen, motion.T_BiBj, std::max(1.0, misfit) * p_covariance);
   const double contradicted = std::max(0.0, 1.0 - 3.0 / misfit);  // the share that is no chance
   const double dt = motion.duration;
   const double predictable = turn.by_prediction.trace() / 3.0;
-  const double shared = predictable + contradicted * by_shift.squaredNorm() / 3.0;
+  const double shared = predictable + contradicted * turn.explained.squaredNorm() / 3.0;
   const double noise =
       turn.covariance.trace() / 3.0 - predictable + motion.turn_variance * at_rest_.gyro * at_rest_.gyro;
-  const Eigen::Vector3d rate_B = log_so3(motion.T_BiBj.R) / dt;
   const SeenTurn seen_turn{t_ns, dt, rate_B, turn.value / dt, noise / (dt * dt)};
   gyro_excess_.add({seen_turn, shared / (dt * dt), x.imu.b_g, x.camera.time_offset}, P);
 }
@@ -89,10 +85,11 @@ std::optional<Innovation> ImuScore::add(const ImuMotion& motion, const StereoMot
     accel_.add(shift(axis), {shift_variance(axis, axis), noise}, t_ns);
   }
   const Eigen::Matrix3d by_samples = motion.covariance * std::pow(learned().accel, 2);
-  const Excess turn = turn_beyond(seen, motion.T_BiBj, by_state + by_samples);
-  add_bias(seen, motion, by_state + by_samples, x, P, t_ns);
-  const std::optional<Innovation> excess = add_excess(turn, motion, P, t_ns);
   const double dt = motion.duration;
+  const Eigen::Vector3d rate_B = log_so3(motion.T_BiBj.R) / dt;
+  add_bias(seen, motion, rate_B, by_state + by_samples, x, P, t_ns);
+  const Excess turn = turn_beyond(seen, motion.T_BiBj, by_state + by_samples);
+  const std::optional<Innovation> excess = add_excess(turn, motion, rate_B, P, t_ns);
   const double rate_variance = P.matrix().diagonal().segment<3>(err::b_g).maxCoeff();
   const Excess way =
       way_beyond(seen, motion.T_BiBj, motion.turn_variance * std::pow(learned().gyro, 2) + rate_variance * dt * dt);

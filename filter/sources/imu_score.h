@@ -68,9 +68,12 @@ class ImuScore {
     Eigen::Vector3d rate_B = Eigen::Vector3d::Zero();    ///< the gyroscope's, the last one [rad/s]
     std::optional<TimeNs> last_ns;
   };
-  std::optional<Innovation> add_excess(const Excess& turn, const ImuMotion& motion, const Covariance& P, TimeNs t_ns);
-  void add_bias(const StereoMotion& seen, const ImuMotion& motion, const Eigen::Matrix3d& predicted, const State& x,
-                const Covariance& P, TimeNs t_ns);
+  /// `rate_B`: of the turn in `motion` [rad/s].
+  std::optional<Innovation> add_excess(const Excess& turn, const ImuMotion& motion, const Eigen::Vector3d& rate_B,
+                                       const Covariance& P, TimeNs t_ns);
+  /// For the gyroscope's bias. `p_covariance`: of the displacement in `motion`.
+  void add_bias(const StereoMotion& seen, const ImuMotion& motion, const Eigen::Vector3d& rate_B,
+                const Eigen::Matrix3d& p_covariance, const State& x, const Covariance& P, TimeNs t_ns);
 
   bool adapts_;
   ImuNoiseFactors at_rest_;  ///< on the stated noise, when it last stood or started

@@ -37,7 +37,8 @@ struct Found {
   int frames = 0;
 };
 
-Found find(GyroExcess& excess, TurningRig& rig, int frames, const Covariance& P = known_bias()) {
+Found find(GyroExcess& excess, TurningRig& rig, int frames) {
+  const Covariance P = known_bias();
   for (int i = 1; i <= frames; ++i) {
     excess.add(next(rig), P);
     const double off = excess.take(P);

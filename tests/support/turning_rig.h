@@ -8,10 +8,9 @@
 
 namespace ear {
 
-inline constexpr double kSigma = 0.02;  // [rad/s] of a turn by two images
-
 /// A body that sways about all axes, and cameras that see it turn.
 struct TurningRig {
+  static constexpr double kSigma = 0.02;           ///< [rad/s] of a turn by two images
   double late = 0.0;                               ///< [s] the images are taken after their stamps
   double dt = 1.0 / 30.0;                          ///< [s] from frame to frame
   double noise = 1.0;                              ///< times what is stated

@@ -182,15 +182,8 @@ def bursts(rows):
     return kept
 
 
-def jump(columns, size):
-    """From the middle on the columns read more by it, every other one less."""
-    def change(rows):
-        for row in rows[len(rows) // 2 :]:
-            for column in columns:
-                row[column] = repr(float(row[column]) + size * (-1) ** (column - columns[0]))
-        return rows
-
-    return change
+def from_middle(change):
+    return lambda rows: rows[: len(rows) // 2] + change(rows[len(rows) // 2 :])
 
 
 def repeated_samples(rows):
@@ -301,8 +294,10 @@ ALTERATIONS = [
     Alteration("imu_spikes", "spikes of one to five inertial samples, 20 a minute, of 3 rad/s and 40 m/s^2 per axis", on(["imu0"], spikes)),
     Alteration("gyro_bias", "gyroscope's bias of 0.05 rad/s in roll and yaw",
                on(["imu0"], each_value((1, 3), lambda x, column: x + (0.05 if column == 3 else -0.05)))),
-    Alteration("gyro_jump", "gyroscope's bias jumps by 0.1 rad/s about all axes, in the middle", on(["imu0"], jump(GYRO, 0.1))),
-    Alteration("accel_jump", "accelerometer's bias jumps by 0.5 m/s^2 along all axes, in the middle", on(["imu0"], jump(ACCEL, 0.5))),
+    Alteration("gyro_jump", "gyroscope's bias jumps by 0.1 rad/s about all axes, in the middle",
+               on(["imu0"], from_middle(each_value(GYRO, lambda x, column: x - 0.1 * (-1) ** column)))),
+    Alteration("accel_jump", "accelerometer's bias jumps by 0.5 m/s^2 along all axes, in the middle",
+               on(["imu0"], from_middle(each_value(ACCEL, lambda x, column: x + 0.5 * (-1) ** column)))),
     Alteration("gyro_scale", "gyroscope that measures 1 % too much", on(["imu0"], each_value(GYRO, lambda x, _: 1.01 * x))),
     Alteration("gyro_axes", "gyroscope whose axes measure 1 % of the turns about the other two", on(["imu0"], through_matrix(LEANING))),
     Alteration("accel_scale", "accelerometer that measures 1 % too much", on(["imu0"], each_value(ACCEL, lambda x, _: 1.01 * x))),

@@ -128,8 +128,9 @@ Excess beyond(const StereoMotion& seen, const Pose& T_B0B1, int begin, const Eig
   const Eigen::Matrix3d across = seen.covariance.block<3, 3>(begin, other);
   const Eigen::LDLT<Eigen::Matrix3d> ldlt(seen.covariance.block<3, 3>(other, other) + covariance);
   const Eigen::Matrix3d gain = ldlt.solve(across.transpose()).transpose();
-  return {excess.segment<3>(begin) - gain * excess.segment<3>(other),
-          seen.covariance.block<3, 3>(begin, begin) - gain * across.transpose(), gain * covariance * gain.transpose()};
+  const Eigen::Vector3d explained = gain * excess.segment<3>(other);
+  return {excess.segment<3>(begin) - explained, seen.covariance.block<3, 3>(begin, begin) - gain * across.transpose(),
+          gain * covariance * gain.transpose(), explained};
 }
 
 }  // namespace
@@ -216,5 +217,12 @@ double apparent_variance(const Covariance& P, const Eigen::Vector3d& motion, con
   const double mounting = P.matrix().diagonal().segment<3>(err::camera).cwiseMax(0.0).maxCoeff();
   return motion.squaredNorm() * (mounting + variance(err::lens(0))) + change.squaredNorm() * variance(err::time_offset);
 }
+
+double apparent_turn_variance(const Covariance& P, const Eigen::Vector3d& rate_B, const Eigen::Vector3d& change) {
+  const double by_matrix = rate_B.squaredNorm() * std::max(0.0, P.matrix()(err::gyro_matrix, err::gyro_matrix));
+  return apparent_variance(P, rate_B, change) + by_matrix;
+}
+
+bool follows(double dt, double duration) { return std::abs(dt - duration) < kPrecise * duration; }
 
 }  // namespace ear

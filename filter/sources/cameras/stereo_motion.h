@@ -64,6 +64,7 @@ struct Excess {
   Eigen::Vector3d value = Eigen::Vector3d::Zero();
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();
   Eigen::Matrix3d by_prediction = Eigen::Matrix3d::Zero();  ///< its part by what was predicted, which frames may share
+  Eigen::Vector3d explained = Eigen::Vector3d::Zero();      ///< what more there would be if nothing were predicted
 };
 /// What the images show of the turn if the displacement is as predicted, to within `p_covariance`. Alone, a fit takes
 /// some of the displacement for a turn, since the depths are noisy.
@@ -74,6 +75,11 @@ struct Excess {
 /// or acceleration `motion` that changes by `change` a second. `P`: of the state's error.
 [[nodiscard]] double apparent_variance(const Covariance& P, const Eigen::Vector3d& motion,
                                        const Eigen::Vector3d& change);
+/// The same of a turn [rad/s], with what the gyroscope's scales and axes add.
+[[nodiscard]] double apparent_turn_variance(const Covariance& P, const Eigen::Vector3d& rate_B,
+                                            const Eigen::Vector3d& change);
+/// Does a frame follow the last one at once, `dt` before [s], if the motion since that took `duration`?
+[[nodiscard]] bool follows(double dt, double duration);
 
 /// Least squares over rotation and translation: the points seen in frame 0, projected into both cameras of frame 1.
 /// Observations further off than `huber` standard deviations weigh less. `sigma`: one observation, normalized; `start`:
