@@ -32,7 +32,7 @@ struct CalibrationState {
 enum class FrameStamp : std::uint8_t {
   usable,
   not_later,   ///< than the frame before
-  no_samples,  ///< no inertial samples reach (nearly) up to it
+  no_samples,  ///< no inertial samples reach (nearly) up to it yet
 };
 
 class Estimator {
@@ -61,7 +61,8 @@ class Estimator {
   [[nodiscard]] virtual std::optional<TimeNs> common_stamp(TimeNs camera_stamp_ns) = 0;
 
   /// Takes the features of one frame. The estimate at the frame's time, or nothing while it cannot start. Features that
-  /// are not finite, that no camera can see, or that come twice are left out and counted.
+  /// are not finite, that no camera can see, or that come twice are left out and counted. A frame that no inertial
+  /// samples reach is reported; the filter keeps it until they do, for what it shows of the frames after it.
   virtual std::optional<Estimate> process(const FeatureFrame& frame) = 0;
 
   /// The same at a time without an image, from all other sensors; a camera's stamp. Tracks go on over it. Nothing where

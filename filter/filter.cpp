@@ -9,15 +9,33 @@
 namespace ear {
 
 Filter::Filter(const FilterConfig& config, const Calibration& calibration)
-    : CommonEstimator(settings_for(checked(config), checked(calibration)), calibration) {}
+    : CommonEstimator(settings_for(checked(config), checked(calibration)), calibration),
+      waiting_(static_cast<std::size_t>(config.window)) {}
 
 // ---- What happens to a frame
 
 std::optional<Estimate> Filter::process(const FeatureFrame& given) {
   if (sources_.shows_nothing(given, ekf_)) return process_without_image(given.t_ns);
   const FrameStamp stamp = check_stamp(given.t_ns);
-  if (stamp == FrameStamp::no_samples) refuse_frame();
+  if (stamp == FrameStamp::no_samples) wait_for_imu(given);
   if (stamp != FrameStamp::usable) return std::nullopt;
+  for (; !waiting_.empty(); waiting_.pop()) {
+    const FeatureFrame& frame = waiting_.front();
+    if (frame.t_ns < given.t_ns && check_stamp(frame.t_ns) == FrameStamp::usable) take_in(frame);
+  }
+  return take_in(given);
+}
+
+/// Until there are inertial samples again, or a later frame has some: where these are missing, the frames between show
+/// how the vehicle moved. Of more than there is room for, the newest ones and every other one before.
+void Filter::wait_for_imu(const FeatureFrame& frame) {
+  refuse_frame();
+  if (!ekf_.running()) return;
+  if (waiting_.full()) waiting_.keep_every_other();
+  waiting_.push(frame);
+}
+
+std::optional<Estimate> Filter::take_in(const FeatureFrame& given) {
   const FeatureFrame& frame = ingest_.plausible(given);
 
   propagate_to(frame);  // start, or compare the sensors (13)-(15) and take in wheels (5)-(8) and lasers (2)-(4)

@@ -14,6 +14,7 @@
 
 #include "filter/common_estimator.h"
 #include "filter/health/bias_watch.h"
+#include "filter/ingest/ring.h"
 
 namespace ear {
 
@@ -31,6 +32,8 @@ class Filter final : public CommonEstimator {
   [[nodiscard]] const Ekf& ekf() const { return ekf_; }
 
  private:
+  void wait_for_imu(const FeatureFrame& frame);
+  std::optional<Estimate> take_in(const FeatureFrame& frame);
   void propagate_to(const FeatureFrame& frame);
   void watch_biases();
   void take_in(const ImuExcess& excess);
@@ -42,6 +45,7 @@ class Filter final : public CommonEstimator {
   [[nodiscard]] std::optional<Estimate> report(bool image, const FrameAgreement& seen);
 
   BiasWatch bias_watch_;
+  Ring<FeatureFrame> waiting_;
   Status without_state_ = Status::waiting_for_imu;  ///< the status while there is no state
 };
 

@@ -129,23 +129,24 @@ class Odometry::Impl {
     }
     StereoFrame frame = given;
     frame.t_ns = *stamp_ns;
-    if (!accepts(frame.t_ns, camera_)) {
-      if (is_time(frame.t_ns) && estimator_->check_stamp(frame.t_ns) == FrameStamp::no_samples) {
-        estimator_->refuse_frame();
-      }
-      return std::nullopt;
-    }
+    const bool usable = accepts(frame.t_ns, camera_);
+    if (!usable && !lacks_samples(frame.t_ns)) return std::nullopt;
     if (!takes_turn(frame.t_ns)) {
-      note_frame(frame.t_ns);
+      if (usable) note_frame(frame.t_ns);
       return std::nullopt;
     }
     const double start = clock_();
-    const FeatureFrame* const features = features_ = track(frame);
+    const bool one_waits = features_ != nullptr && last_frame_ns_ && features_->t_ns > *last_frame_ns_;
+    MotionPrediction prediction;  // from the image before: the estimator knows nothing of one that waits
+    if (!one_waits && config_.frontend.motion_prediction) {
+      prediction = to_prediction(estimator_->motion_to(frame.t_ns));
+    }
+    const FeatureFrame* const features = features_ = track(frame, prediction);
     if (features == nullptr) {
-      ++camera_.implausible;
+      if (usable) ++camera_.implausible;
       return std::nullopt;
     }
-    note_frame(frame.t_ns);
+    if (usable) note_frame(frame.t_ns);
     std::optional<Estimate> estimate = timed([&] { return estimator_->process(*features); });
     load_.add(clock_() - start, frame.t_ns);
     return estimate;
@@ -182,6 +183,10 @@ class Odometry::Impl {
     return false;
   }
 
+  [[nodiscard]] bool lacks_samples(TimeNs t_ns) const {
+    return is_time(t_ns) && estimator_->check_stamp(t_ns) == FrameStamp::no_samples;
+  }
+
   /// Whether this frame is used at all, and how much of it: as the budget allows.
   bool takes_turn(TimeNs t_ns) {
     const LoadLimits limits = load_.limits();
@@ -214,10 +219,8 @@ class Odometry::Impl {
   }
 
   /// The frame's features; nothing if its images do not fit the calibration.
-  const FeatureFrame* track(const StereoFrame& frame) {
+  const FeatureFrame* track(const StereoFrame& frame, const MotionPrediction& prediction) {
     if (!frontend_) return nullptr;
-    MotionPrediction prediction;
-    if (config_.frontend.motion_prediction) prediction = to_prediction(estimator_->motion_to(frame.t_ns));
     try {
       const FeatureFrame& features = frontend_->process(frame, prediction);
       const FrontendTiming& timing = frontend_->timing();

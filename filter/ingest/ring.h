@@ -27,6 +27,13 @@ class Ring {
     items_[(first_ + size_++) % items_.size()] = item;
   }
 
+  /// Keeps the oldest, and every other one after that.
+  void keep_every_other() {
+    const std::size_t kept = (size_ + 1) / 2;
+    for (std::size_t i = 1; i < kept; ++i) (*this)[i] = (*this)[2 * i];
+    size_ = kept;
+  }
+
   void clear() { size_ = 0; }
 
   void pop() {

@@ -109,12 +109,12 @@ struct StreamCounts {
 /// What was refused or bridged since the start: no sample is dropped without being counted. How far the samples
 /// accepted agree with the state is in Health::sources.
 struct InputCounts {
-  StreamCounts imu;               ///< gaps: longer than 2.5 of the usual intervals
-  StreamCounts encoder;           ///< gaps: longer than 0.25 s
-  StreamCounts laser;             ///< gaps: longer than 0.25 s
-  StreamCounts camera;            ///< frames; far_ahead: no inertial samples reach their time; gaps: longer than 0.25 s
-  std::uint64_t imu_spikes = 0;   ///< of one to five samples, crossed by a line
-  std::uint64_t clock_jumps = 0;  ///< of one sensor's clock against all others, which were taken out
+  StreamCounts imu;                     ///< gaps: longer than 2.5 of the usual intervals
+  StreamCounts encoder;                 ///< gaps: longer than 0.25 s
+  StreamCounts laser;                   ///< gaps: longer than 0.25 s
+  StreamCounts camera;                  ///< frames; far_ahead: ahead of the inertial samples; gaps: longer than 0.25 s
+  std::uint64_t imu_spikes = 0;         ///< of one to five samples, crossed by a line
+  std::uint64_t clock_jumps = 0;        ///< of one sensor's clock against all others, which were taken out
   std::uint64_t features_rejected = 0;  ///< not finite, in no image that there is, or twice in a frame
   std::uint64_t steps_rejected = 0;     ///< calls of Odometry::step for a time not later than the state, or without IMU
 };

@@ -4,8 +4,10 @@
 #include <doctest/doctest.h>
 
 #include <cmath>
-
+#include <cstddef>
 #include <vector>
+
+#include "filter/ingest/ring.h"
 
 using namespace ear;
 
@@ -47,6 +49,24 @@ void push(Ingest& ingest, TimeNs t_ns, std::int64_t count) {
 }
 
 }  // namespace
+
+TEST_CASE("ring: keeps the oldest and every other one after that, in order, wherever it begins") {
+  for (const int passed : {0, 3}) {
+    CAPTURE(passed);
+    for (const int count : {0, 1, 4, 5}) {
+      CAPTURE(count);
+      Ring<int> ring(5);
+      for (int i = 0; i < passed; ++i) {
+        ring.push(i);
+        ring.pop();
+      }
+      for (int i = 0; i < count; ++i) ring.push(i);
+      ring.keep_every_other();
+      REQUIRE(ring.size() == static_cast<std::size_t>((count + 1) / 2));
+      for (std::size_t i = 0; i < ring.size(); ++i) CHECK(ring[i] == static_cast<int>(2 * i));
+    }
+  }
+}
 
 TEST_CASE("ingest: readings come out in the order of their times, increments at their middle") {
   Ingest ingest = filled(100 * kMs);

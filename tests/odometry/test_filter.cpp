@@ -5,6 +5,7 @@
 #include <limits>
 #include <random>
 #include <utility>
+#include <vector>
 
 #include "filter/filter.h"
 #include "tests/support/simulated_run.h"
@@ -429,6 +430,49 @@ TEST_CASE("filter: a gap in the inertial data is counted and survived") {
   REQUIRE(estimate);
   const simulator::Truth truth = simulation.truth(estimate->state.t_ns);
   CHECK((estimate->state.v_W.norm() - truth.v_W.norm()) < 0.1);
+}
+
+TEST_CASE("filter: frames wait for inertial samples that a driver holds back, and little is lost") {
+  const simulator::Simulation simulation = simulate("fly1", 12.0, false);
+  const TimeNs first_ns = simulation.frame_times().front();
+  FilterConfig config;
+  config.odometer.model = OdometerModel::none;
+  struct Driver {
+    Filter& filter;
+    TimeNs from_ns, to_ns;
+    std::vector<ImuSample> held;
+    void add_imu(const ImuSample& sample) {
+      held.push_back(sample);
+      if (sample.t_ns > from_ns && sample.t_ns < to_ns) return;
+      for (const ImuSample& each : held) filter.add_imu(each);
+      held.clear();
+    }
+    void add_encoder(const EncoderSample&) {}
+    void add_laser(const LaserSample&) {}
+  };
+  const auto run = [&](double held_up, int& refused) {
+    Filter filter(config, simulation.calibration());
+    const TimeNs from_ns = first_ns + 8'000'000'000;
+    Driver driver{filter, from_ns, from_ns + static_cast<TimeNs>(1e9 * held_up), {}};
+    experiments::SampleFeed feed(simulation);
+    std::optional<Estimate> estimate;
+    for (std::size_t i = 0; i < simulation.frame_times().size(); ++i) {
+      const TimeNs t_ns = simulation.frame_times()[i];
+      feed.until_frame(t_ns, driver);
+      refused += filter.check_stamp(t_ns) == FrameStamp::no_samples ? 1 : 0;
+      estimate = filter.process(simulation.tracks(i));
+    }
+    REQUIRE(estimate);
+    return *estimate;
+  };
+  int refused_before = 0, refused = 0;
+  const Estimate before = run(0.0, refused_before);
+  const Estimate estimate = run(0.45, refused);
+  CHECK(refused_before == 0);
+  CHECK(refused > 4);
+  const Eigen::Vector3d dp_W = estimate.state.p_WB - before.state.p_WB;
+  const Eigen::Matrix3d P = before.covariance.block<3, 3>(estimate_error::position, estimate_error::position);
+  CHECK(dp_W.norm() < 0.1 * std::sqrt(P.trace()));  // 0.03; 0.15 if they do not wait
 }
 
 TEST_CASE("filter: settings and calibrations that cannot be are refused by name") {

@@ -119,6 +119,19 @@ TEST_CASE("jumps: half a second without inertial samples, with a frame just befo
   expect_cheap("flat1", "imu_gap@20+0.5", clean, 2.0, 931);  // the frame at 20.508 s, the samples at 20.518 s
 }
 
+TEST_CASE("jumps: over nearly two seconds without inertial samples the frames show how the vehicle moved") {
+  for (const char* const sequence : {"flat1", "fly1"}) {
+    CAPTURE(sequence);
+    double squares = 0.0, clean_squares = 0.0;
+    for (const std::uint64_t seed : {976, 977, 978}) {
+      const double clean = run(sequence, "", seed).ate, ate = run(sequence, "imu_gap@17+1.9", seed).ate;
+      clean_squares += clean * clean;
+      squares += ate * ate;
+    }
+    CHECK(squares < 1.7 * clean_squares);  // 2 to 6 times by the frames around the gap alone
+  }
+}
+
 TEST_CASE("jumps: what nearly two seconds without inertial samples leave unknown is said") {
   for (const char* const sequence : {"wave1", "wave3"}) {
     for (const std::uint64_t seed : {985, 986, 6734, 6735}) {
