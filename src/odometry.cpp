@@ -130,7 +130,7 @@ class Odometry::Impl {
     StereoFrame frame = given;
     frame.t_ns = *stamp_ns;
     const bool usable = accepts(frame.t_ns, camera_);
-    if (!usable && !lacks_samples(frame.t_ns)) return std::nullopt;
+    if (!usable && !may_wait(frame.t_ns)) return std::nullopt;
     if (!takes_turn(frame.t_ns)) {
       if (usable) note_frame(frame.t_ns);
       return std::nullopt;
@@ -183,8 +183,13 @@ class Odometry::Impl {
     return false;
   }
 
-  [[nodiscard]] bool lacks_samples(TimeNs t_ns) const {
-    return is_time(t_ns) && estimator_->check_stamp(t_ns) == FrameStamp::no_samples;
+  /// For inertial samples. The first image after others were missing too does not: with the next one samples will show
+  /// where its features are.
+  bool may_wait(TimeNs t_ns) {
+    if (!is_time(t_ns) || estimator_->check_stamp(t_ns) != FrameStamp::no_samples) return false;
+    if (features_ != nullptr && seconds_between(features_->t_ns, t_ns) <= kStreamGap) return true;
+    estimator_->refuse_frame();
+    return false;
   }
 
   /// Whether this frame is used at all, and how much of it: as the budget allows.
