@@ -21,9 +21,9 @@ std::optional<Estimate> Filter::process(const FeatureFrame& given) {
   if (stamp != FrameStamp::usable) return std::nullopt;
   for (; !waiting_.empty(); waiting_.pop()) {
     const FeatureFrame& frame = waiting_.front();
-    if (frame.t_ns < given.t_ns && check_stamp(frame.t_ns) == FrameStamp::usable) take_in(frame);
+    if (frame.t_ns < given.t_ns && check_stamp(frame.t_ns) == FrameStamp::usable) process_usable(frame);
   }
-  return take_in(given);
+  return process_usable(given);
 }
 
 /// Until there are inertial samples again, or a later frame has some: where these are missing, the frames between show
@@ -35,7 +35,7 @@ void Filter::wait_for_imu(const FeatureFrame& frame) {
   waiting_.push(frame);
 }
 
-std::optional<Estimate> Filter::take_in(const FeatureFrame& given) {
+std::optional<Estimate> Filter::process_usable(const FeatureFrame& given) {
   const FeatureFrame& frame = ingest_.plausible(given);
 
   propagate_to(frame);  // start, or compare the sensors (13)-(15) and take in wheels (5)-(8) and lasers (2)-(4)

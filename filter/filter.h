@@ -33,7 +33,7 @@ class Filter final : public CommonEstimator {
 
  private:
   void wait_for_imu(const FeatureFrame& frame);
-  std::optional<Estimate> take_in(const FeatureFrame& frame);
+  std::optional<Estimate> process_usable(const FeatureFrame& frame);
   void propagate_to(const FeatureFrame& frame);
   void watch_biases();
   void take_in(const ImuExcess& excess);
@@ -45,7 +45,7 @@ class Filter final : public CommonEstimator {
   [[nodiscard]] std::optional<Estimate> report(bool image, const FrameAgreement& seen);
 
   BiasWatch bias_watch_;
-  Ring<FeatureFrame> waiting_;
+  Ring<FeatureFrame> waiting_;                      ///< for inertial samples
   Status without_state_ = Status::waiting_for_imu;  ///< the status while there is no state
 };
 

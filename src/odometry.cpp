@@ -132,7 +132,11 @@ class Odometry::Impl {
     const bool usable = accepts(frame.t_ns, camera_);
     if (!usable && !may_wait(frame.t_ns)) return std::nullopt;
     if (!takes_turn(frame.t_ns)) {
-      if (usable) note_frame(frame.t_ns);
+      if (usable) {
+        note_frame(frame.t_ns);
+      } else {
+        estimator_->refuse_frame();
+      }
       return std::nullopt;
     }
     const double start = clock_();
@@ -143,7 +147,11 @@ class Odometry::Impl {
     }
     const FeatureFrame* const features = features_ = track(frame, prediction);
     if (features == nullptr) {
-      if (usable) ++camera_.implausible;
+      if (usable) {
+        ++camera_.implausible;
+      } else {
+        estimator_->refuse_frame();
+      }
       return std::nullopt;
     }
     if (usable) note_frame(frame.t_ns);
