@@ -85,13 +85,13 @@ void Filter::watch_biases() {
   if (jump.any()) take_in(jump, t_ns);
 }
 
-/// What is more than any bias has another cause: sensors that are mounted elsewhere, clocks that differ. An
-/// accelerometer that nobody calibrated has ten times the prior; a gyroscope's prior has room for that.
+/// What is more than any bias has another cause: sensors that are mounted elsewhere, clocks that differ.
 void Filter::take_in(const ImuExcess& excess) {
   BiasJump jump;
   jump.fault = {excess.gyro > 0.0, excess.accel > 0.0};
-  if (excess.gyro < kClear * config_.prior.gyro_bias) jump.gyro = excess.gyro;
-  if (excess.accel < std::sqrt(kFarthest) * config_.prior.accel_bias) jump.accel = excess.accel;
+  const ImuLimits limits = imu_limits(config_.prior);
+  if (excess.gyro < limits.gyro) jump.gyro = excess.gyro;
+  if (excess.accel < limits.accel) jump.accel = excess.accel;
   if (jump.fault.any()) take_in(jump, ekf_.state().imu.t_ns);
   if (config_.online_calibration.time_offset && excess.clock > 0.0) ekf_.inflate_clock(excess.clock);
 }

@@ -178,22 +178,24 @@ void FlowCheck::find_into(const std::vector<Flow>& flows, const MotionGuess& gue
     std::vector<std::size_t>& all = indices_;
     all.resize(flows.size());
     std::iota(all.begin(), all.end(), std::size_t{0});
-    if (!guess.rotation_known) {
+    if (guess.rotation_known) {
+      search<2>(
+          problem, all, random_,
+          [&](const std::array<std::size_t, 2>& s) -> std::optional<Transfer> {
+            const auto p = solve_direction(flows, s[0], s[1], guess.motion.R_10);
+            if (!p) return std::nullopt;
+            return Transfer{guess.motion.R_10, *p};
+          },
+          best, trial_);
+    } else {
       search<5>(
           problem, all, random_,
           [&](const std::array<std::size_t, 5>& s) { return refine_turn(flows, flagged(s), guess.motion, kSteps); },
           best, trial_);
-      return prefer(problem, refine_turn(flows, best.flags, best.motion, kRefinements), best, trial_);
     }
-    search<2>(
-        problem, all, random_,
-        [&](const std::array<std::size_t, 2>& s) -> std::optional<Transfer> {
-          const auto p = solve_direction(flows, s[0], s[1], guess.motion.R_10);
-          if (!p) return std::nullopt;
-          return Transfer{guess.motion.R_10, *p};
-        },
-        best, trial_);
-    return drop_fixed(flows, guess, tolerance_, best.flags);
+    prefer(problem, refine_turn(flows, best.flags, best.motion, kRefinements), best, trial_);  // gyroscopes err
+    if (guess.rotation_known) drop_fixed(flows, guess, tolerance_, best.flags);
+    return;
   }
 
   const double settled = kSettled * tolerance_;

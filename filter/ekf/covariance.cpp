@@ -5,6 +5,7 @@
 
 #include "filter/ekf/initial_state.h"
 #include "filter/ekf/kernel_matrix.h"
+#include "filter/ekf/so3.h"
 
 namespace ear {
 namespace {
@@ -159,6 +160,17 @@ ClonePair Covariance::corrected(int row, int column) const {
   constexpr int size = err::clone_size;
   return P_.block<size, size>(row, column) -
          PHt_.block(row, 0, size, rows_).lazyProduct(PHt_.block(column, 0, size, rows_).transpose());
+}
+
+Eigen::Matrix3d Covariance::of_way(const ClonePoint& from, const ClonePoint& to, bool after) const {
+  constexpr int size = err::clone_size;
+  const auto P = [&](int a, int b) -> ClonePair { return after ? corrected(a, b) : P_.block<size, size>(a, b); };
+  const int i = from.entry, j = to.entry;
+  Eigen::Matrix<double, 2 * size, 2 * size> P_both;
+  P_both << P(i, i), P(i, j), P(j, i), P(j, j);
+  Eigen::Matrix<double, 3, 2 * size> J;  // by the errors of both clones
+  J << skew(from.p_W), -Eigen::Matrix3d::Identity(), -skew(to.p_W), Eigen::Matrix3d::Identity();
+  return J * P_both * J.transpose();
 }
 
 Eigen::Ref<const Eigen::VectorXd> Covariance::correction(const Eigen::Ref<const Eigen::MatrixXd>& H, int first_column,

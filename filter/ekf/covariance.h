@@ -12,6 +12,12 @@ namespace ear {
 /// Covariance of the poses of one clone with those of another.
 using ClonePair = Eigen::Matrix<double, err::clone_size, err::clone_size>;
 
+/// A point that does not move in the frame of a clone, whose error begins at `entry`.
+struct ClonePoint {
+  int entry = 0;
+  Eigen::Vector3d p_W = Eigen::Vector3d::Zero();
+};
+
 /// Symmetric matrix of the error vector (state.h). All memory is taken at construction.
 class Covariance {
  public:
@@ -66,6 +72,8 @@ class Covariance {
                                                int considered_first = 0, int considered_count = 0);
   /// What update() with the rows of the last correction() would leave of two clones, which begin at `row` and `column`.
   [[nodiscard]] ClonePair corrected(int row, int column) const;
+  /// Of the way from one point to another, in W [m^2]; `after`: what such an update would leave of it.
+  [[nodiscard]] Eigen::Matrix3d of_way(const ClonePoint& from, const ClonePoint& to, bool after = false) const;
 
  private:
   FilterKernels kernels_;

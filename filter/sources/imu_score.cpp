@@ -26,17 +26,17 @@ void ImuScore::add_rest(const ImuStatistics& rest, const ImuCalibration& stated)
 /// out in it; the bias as the state knows it does not, nor what the errors of the cameras' mounting, focal length and
 /// time offset make look like a turn. The same turns show whether the clocks differ.
 std::optional<Innovation> ImuScore::add_excess(const Excess& turn, const ImuMotion& motion,
-                                               const Eigen::Vector3d& rate_B, const Covariance& P, TimeNs t_ns) {
+                                               const Eigen::Vector3d& rate_B, double apparent, const Covariance& P,
+                                               TimeNs t_ns) {
   TurnExcess& e = turn_excess_;
   const double dt = motion.duration;
   if (!turn.value.allFinite() || !turn.covariance.allFinite() || !P.matrix().diagonal().allFinite())
     return std::nullopt;
   const double since = e.last_ns ? seconds_between(*e.last_ns, t_ns) : kStale;
   const auto variance = [&P](int entry) { return std::max(0.0, P.matrix()(entry, entry)); };
-  const Eigen::Vector3d change = since < kStale ? Eigen::Vector3d((rate_B - e.rate_B) / dt) : Eigen::Vector3d::Zero();
   const double kept = std::exp(-std::max(0.0, since) / kStale);
   e.count = kept * e.count + 1.0;
-  e.apparent = kept * e.apparent + apparent_turn_variance(P, rate_B, change);
+  e.apparent = kept * e.apparent + apparent;
   e.rate_B = rate_B;
   e.last_ns = t_ns;
   const double noise = motion.turn_variance * std::pow(learned().gyro, 2);
@@ -72,6 +72,30 @@ void ImuScore::add_bias(const StereoMotion& seen, const ImuMotion& motion, const
   gyro_excess_.add({seen_turn, shared / (dt * dt), x.imu.b_g, x.camera.time_offset}, P);
 }
 
+void ImuScore::add_frame_turn(const Excess& turn, const ImuMotion& motion, double apparent, const Covariance& P) {
+  FrameNoise::Seen seen;
+  const Eigen::Array3d rate = P.matrix().diagonal().segment<3>(err::b_g).array() + apparent;
+  seen.beyond = turn.value;
+  seen.others = turn.covariance.diagonal().array() + rate * motion.duration * motion.duration;
+  seen.noise.setConstant(motion.turn_variance);
+  seen.believed = learned().gyro;
+  frame_.add_turn(seen, motion.duration);
+}
+
+/// Depths have errors that all features share: a wrong length of each way.
+void ImuScore::add_frame_way(const Excess& way, const ImuMotion& motion, const Eigen::Matrix3d& by_state,
+                             const Covariance& P, TimeNs t_ns) {
+  FrameNoise::Seen seen;
+  const double dt = motion.duration;
+  const Eigen::Array3d by_depths = (kPrecise * motion.T_BiBj.p).array().square();
+  const double apparent = apparent_variance(P, motion.T_BiBj.p / dt, motion.gained_W / dt);
+  seen.beyond = way.value;
+  seen.others = (way.covariance + by_state).diagonal().array() + by_depths + apparent * dt * dt;
+  seen.noise = motion.covariance.diagonal();
+  seen.believed = learned().accel;
+  frame_.add_way(seen, dt, t_ns);
+}
+
 std::optional<Innovation> ImuScore::add(const ImuMotion& motion, const StereoMotion& images, const State& x,
                                         const Covariance& P, TimeNs t_ns) {
   if (!(motion.duration > 0.0) || images.fitting < kStill * images.matches) return std::nullopt;
@@ -89,10 +113,16 @@ std::optional<Innovation> ImuScore::add(const ImuMotion& motion, const StereoMot
   const Eigen::Vector3d rate_B = log_so3(motion.T_BiBj.R) / dt;
   add_bias(seen, motion, rate_B, by_state + by_samples, x, P, t_ns);
   const Excess turn = turn_beyond(seen, motion.T_BiBj, by_state + by_samples);
-  const std::optional<Innovation> excess = add_excess(turn, motion, rate_B, P, t_ns);
+  const bool goes_on = turn_excess_.last_ns && seconds_between(*turn_excess_.last_ns, t_ns) < kStale;
+  const Eigen::Vector3d change =
+      goes_on ? Eigen::Vector3d((rate_B - turn_excess_.rate_B) / dt) : Eigen::Vector3d::Zero();
+  const double apparent = apparent_turn_variance(P, rate_B, change);
+  const std::optional<Innovation> excess = add_excess(turn, motion, rate_B, apparent, P, t_ns);
+  add_frame_turn(turn, motion, apparent, P);
+  const double turn_noise = motion.turn_variance * std::pow(std::max(learned().gyro, frame_.factors().gyro), 2);
   const double rate_variance = P.matrix().diagonal().segment<3>(err::b_g).maxCoeff();
-  const Excess way =
-      way_beyond(seen, motion.T_BiBj, motion.turn_variance * std::pow(learned().gyro, 2) + rate_variance * dt * dt);
+  const Excess way = way_beyond(seen, motion.T_BiBj, turn_noise + rate_variance * dt * dt);
+  add_frame_way(way, motion, by_state, P, t_ns);
   const Eigen::Matrix3d& R_WB = x.imu.R_WB;
   const Eigen::Matrix3d noise = R_WB * (way.covariance + by_samples) * R_WB.transpose() / (dt * dt);
   const Eigen::Matrix3d gained = 3.0 / (dt * dt) * R_WB * by_samples * R_WB.transpose();  // T of T^3 / 3
@@ -106,6 +136,10 @@ std::optional<Innovation> ImuScore::add(const ImuMotion& motion, const StereoMot
   return excess;
 }
 
-ImuNoiseFactors ImuScore::noise() const { return adapts_ ? learned() : ImuNoiseFactors{}; }
+ImuNoiseFactors ImuScore::noise() const {
+  if (!adapts_) return {};
+  const ImuNoiseFactors lasting = learned(), now = frame_.factors();
+  return {std::max(lasting.gyro, now.gyro), std::max(lasting.accel, now.accel)};
+}
 
 }  // namespace ear

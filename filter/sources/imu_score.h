@@ -1,7 +1,7 @@
 // How noisy the inertial sensors are: at rest by their samples alone, in motion by what they measure between two images
-// of two cameras against what these show, and before that by the images of the start. Vibration, missing samples and
-// wrong stamps make them noisier than their data sheet. And whether a bias jumped or a clock is off, by the same pairs
-// of images. docs/filter.md, "Propagation" and "Gaps and jumps".
+// against what these show, and before that by the images of the start. Vibration, missing samples and wrong stamps make
+// them noisier than their data sheet. And whether a bias jumped or a clock is off, by the same pairs of images.
+// docs/filter.md, "Propagation" and "Gaps and jumps".
 #pragma once
 
 #include <Eigen/Core>
@@ -17,6 +17,7 @@
 #include "filter/sources/accel_excess.h"
 #include "filter/sources/cameras/stereo_motion.h"
 #include "filter/sources/clock_excess.h"
+#include "filter/sources/frame_noise.h"
 #include "filter/sources/gyro_excess.h"
 
 namespace ear {
@@ -30,8 +31,8 @@ struct ImuExcess {
 
 class ImuScore {
  public:
-  /// `adapts`: false for the noise that the calibration states.
-  explicit ImuScore(bool adapts) : adapts_(adapts) {}
+  /// `adapts`: false for the noise that the calibration states. `limits`: of what counts as noise in a single frame.
+  ImuScore(bool adapts, const ImuLimits& limits) : adapts_(adapts), frame_(limits) {}
 
   /// Samples of a vehicle that stands, which show the white noise; `stated`: what the calibration says of it.
   void add_rest(const ImuStatistics& rest, const ImuCalibration& stated);
@@ -40,6 +41,8 @@ class ImuScore {
   /// Where there is no camera: what the accelerometer's samples and the wheels show, as a factor. Images know better.
   /// Not the gyroscope's: wheels would turn the vehicle instead, whose track width is a guess.
   void set_unseen_accel(double factor) { unseen_accel_ = factor; }
+  /// Another frame, before anything is known of it.
+  void start_frame() { frame_.start_frame(); }
   /// The motion from the state `x` to a frame at `t_ns` by the inertial samples, and as the images show it. `P`: of the
   /// state's error. By how much the cameras turned faster than the gyroscope of late [rad/s], in the mean, about the
   /// axis where it is least likely; nothing if the images show too little.
@@ -51,7 +54,7 @@ class ImuScore {
             clock_excess_.take(P.matrix()(err::time_offset, err::time_offset))};
   }
 
-  /// Factors on the noise of all samples, 1 or more.
+  /// Factors on the noise of all samples up to this frame, 1 or more.
   [[nodiscard]] ImuNoiseFactors noise() const;
 
  private:
@@ -68,9 +71,14 @@ class ImuScore {
     Eigen::Vector3d rate_B = Eigen::Vector3d::Zero();    ///< the gyroscope's, the last one [rad/s]
     std::optional<TimeNs> last_ns;
   };
-  /// `rate_B`: of the turn in `motion` [rad/s].
+  /// `rate_B`: of the turn in `motion` [rad/s]. `apparent`: variance of what errors of the cameras' calibration make
+  /// look like one [rad^2/s^2].
   std::optional<Innovation> add_excess(const Excess& turn, const ImuMotion& motion, const Eigen::Vector3d& rate_B,
-                                       const Covariance& P, TimeNs t_ns);
+                                       double apparent, const Covariance& P, TimeNs t_ns);
+  /// For the noise of this frame. `turn` and `way`: beyond the samples.
+  void add_frame_turn(const Excess& turn, const ImuMotion& motion, double apparent, const Covariance& P);
+  void add_frame_way(const Excess& way, const ImuMotion& motion, const Eigen::Matrix3d& by_state, const Covariance& P,
+                     TimeNs t_ns);
   /// For the gyroscope's bias. `p_covariance`: of the displacement in `motion`.
   void add_bias(const StereoMotion& seen, const ImuMotion& motion, const Eigen::Vector3d& rate_B,
                 const Eigen::Matrix3d& p_covariance, const State& x, const Covariance& P, TimeNs t_ns);
@@ -82,6 +90,7 @@ class ImuScore {
   AccelExcess accel_excess_;
   ClockExcess clock_excess_;
   GyroExcess gyro_excess_;
+  FrameNoise frame_;
   NoiseScore gyro_{kStreamMemory, kFarthest}, accel_{kStreamMemory, kFarthest};
 };
 

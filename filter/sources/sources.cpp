@@ -27,7 +27,7 @@ std::optional<Standstill::GyroBias> gyro_bias(const Ekf& ekf) {
 
 Sources::Sources(const FilterConfig& config, const Calibration& calibration)
     : imu_(calibration.imu),
-      imu_score_(config.odometer.scores),
+      imu_score_(config.odometer.scores, imu_limits(config.prior)),
       ground_(config, calibration),
       cameras_(config, calibration),
       standstill_(config.standstill, focal_length(calibration), config.window) {
@@ -82,6 +82,7 @@ Displacements Sources::displacements(const FeatureFrame& frame, TimeNs t_ns, con
 
 ImuExcess Sources::score_imu(const FeatureFrame& frame, const Ekf& ekf, Records& records) {
   const std::optional<StereoMotion>& seen = cameras_.seen();
+  imu_score_.start_frame();
   if (!seen) return {};
   const State& x = ekf.state();
   const std::optional<Innovation> turn = imu_score_.add(motion_, *seen, x, ekf.covariance(), frame.t_ns);

@@ -2,6 +2,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
+#include <array>
 #include <random>
 
 #include "filter/ekf/covariance.h"
@@ -121,6 +122,35 @@ TEST_CASE("covariance: the update is Kalman's, and stays symmetric and positive"
     CHECK((P.matrix() - P.matrix().transpose()).norm() == 0.0);
     CHECK(Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(P.matrix()).eigenvalues().minCoeff() > 0.0);
   }
+}
+
+TEST_CASE("covariance: the way between two points that hang on clones, against numerical differentiation") {
+  std::mt19937_64 rng{37};
+  Covariance P = filled(rng);
+  const State x = random_state(rng, 2);
+  const std::array<Eigen::Vector3d, 2> in_clone{random_vector(rng, 0.3), random_vector(rng, 0.3)};
+  const auto point = [&](const State& at, std::size_t k) -> Eigen::Vector3d {
+    return at.clones[k].T_WB.R * in_clone[k] + at.clones[k].T_WB.p;
+  };
+  constexpr double kStep = 1e-6;
+  Eigen::MatrixXd J(3, x.error_size());
+  for (int column = 0; column < x.error_size(); ++column) {
+    const auto way = [&](double step) -> Eigen::Vector3d {
+      State moved = x;
+      boxplus(moved, step * Eigen::VectorXd::Unit(x.error_size(), column));
+      return point(moved, 1) - point(moved, 0);
+    };
+    J.col(column) = (way(kStep) - way(-kStep)) / (2.0 * kStep);
+  }
+  const ClonePoint from{err::clone(0), point(x, 0)}, to{err::clone(1), point(x, 1)};
+  const Eigen::Matrix3d expected = J * P.matrix() * J.transpose();
+  CHECK((P.of_way(from, to) - expected).norm() < 1e-6 * expected.norm());
+  const Eigen::MatrixXd H = random_matrix(rng, 5, P.size());
+  const Eigen::VectorXd r = random_matrix(rng, 5, 1);
+  (void)P.correction(H, 0, r);
+  const Eigen::Matrix3d after = P.of_way(from, to, true);
+  (void)P.update(H, 0, r);
+  CHECK((after - P.of_way(from, to)).norm() < 1e-9 * expected.norm());
 }
 
 TEST_CASE("covariance: what is only considered keeps value and variance, the rest knows less than with it") {

@@ -43,7 +43,7 @@ struct Rig {
 
 /// The score after some time, and how the rates were judged in it.
 struct Judged {
-  ImuScore score{true};
+  ImuScore score{true, imu_limits(PriorConfig{})};
   int fit = 0, unfit = 0;
 };
 
@@ -184,7 +184,7 @@ TEST_CASE("imu score: what the samples show at rest is the noise that innovation
   rest.count = 100;
   rest.gyro_density = 4.0 * stated.gyro_noise;
   rest.accel_density = 0.5 * stated.accel_noise;
-  ImuScore score(true);
+  ImuScore score(true, imu_limits(PriorConfig{}));
   score.add_rest(rest, stated);
   CHECK(score.noise().gyro == doctest::Approx(4.0));
   CHECK(score.noise().accel == 1.0);  // never less than stated
@@ -195,7 +195,7 @@ TEST_CASE("imu score: what the samples show at rest is the noise that innovation
 }
 
 TEST_CASE("imu score: switched off, the noise is the stated one") {
-  ImuScore score(false);
+  ImuScore score(false, imu_limits(PriorConfig{}));
   CHECK(score.noise().gyro == 1.0);
   CHECK(score.noise().accel == 1.0);
 }

@@ -104,6 +104,18 @@ TEST_CASE("flow check: without depth, what leaves its epipolar plane is found") 
   CHECK(unknown.kept_moving <= 5);
 }
 
+TEST_CASE("flow check: without depth, a gyroscope that is off by two pixels costs few features") {
+  const Example example = make_example(false, 0.1, {0.3, 0.0, 0.05}, 2);
+  FlowCheck check(2.0 * kPixel);
+  for (int axis = 0; axis < 3; ++axis) {
+    const Eigen::AngleAxisd off(2.0 * kPixel, Eigen::Vector3d::Unit(axis));
+    const Eigen::Matrix3d R_10 = example.motion.R_10 * off.toRotationMatrix();
+    const Score s = score(example, check.find(example.flows, {{R_10, Eigen::Vector3d::Zero()}, true, false}).inliers);
+    CHECK(s.kept_static >= 73);
+    CHECK(s.kept_moving <= 5);
+  }
+}
+
 TEST_CASE("flow check: turn and direction of flows without depth, from a guess on, to the last digit") {
   for (const unsigned seed : {5U, 6U, 7U}) {
     CAPTURE(seed);

@@ -35,11 +35,14 @@ simulator::Simulation simulate(const std::string& sequence, const std::string& f
   return simulator::Simulation(options);
 }
 
-Outcome run(const std::string& sequence, const std::string& fault, std::uint64_t seed = kSeed) {
+Outcome run(const std::string& sequence, const std::string& fault, std::uint64_t seed = kSeed,
+            std::size_t cameras = 2) {
   const simulator::Simulation simulation = simulate(sequence, fault, seed, 35.0);
+  Calibration calibration = simulation.calibration();
+  calibration.cameras.resize(cameras);
   Outcome outcome;
   TimeNs last_ns = 0;
-  const Figures figures = measure(simulation, simulation.calibration(), FilterConfig{}, evaluation::AlignmentKind::yaw,
+  const Figures figures = measure(simulation, calibration, FilterConfig{}, evaluation::AlignmentKind::yaw,
                                   [&](TimeNs t_ns, const Health& health) {
                                     const double t = seconds_between(simulation.truth_times().front(), t_ns);
                                     if (health.status == HealthStatus::lost)
@@ -93,6 +96,25 @@ TEST_CASE("jumps: a bias of the accelerometer that jumps while hardly a track en
     CHECK(outcome.named);
     CHECK(outcome.false_tracking == 0.0);
     CHECK(outcome.lost == 0.0);
+  }
+}
+
+TEST_CASE("jumps: one camera sees that inertial sensors are wrong, and the state follows it") {
+  for (const char* const sequence : {"flat1", "fly1"}) {
+    for (const char* const fault : {"imu_bias_jump.gyro@20+5=0.1", "imu_bias_jump.accel@20+5=0.05"}) {
+      double squares = 0.0, clean_squares = 0.0;
+      CAPTURE(sequence);
+      CAPTURE(fault);
+      for (const std::uint64_t seed : {841, 842}) {
+        const double clean = run(sequence, "", seed, 1).ate;
+        const Outcome outcome = run(sequence, fault, seed, 1);
+        clean_squares += clean * clean;
+        squares += outcome.ate * outcome.ate;
+        CHECK(outcome.false_tracking == 0.0);
+        MESSAGE(seed << " " << clean << " " << outcome.ate << " named " << outcome.named << " lost " << outcome.lost);
+      }
+      CHECK(squares < 4.0 * clean_squares);
+    }
   }
 }
 

@@ -34,6 +34,7 @@ Cameras::Cameras(const FilterConfig& config, const Calibration& calibration)
       count_(calibration.cameras.size()),
       focal_px_(focal_length(calibration)),
       tracks_(2 * kFeatureCapacity, static_cast<std::size_t>(config.window) + 1),
+      views_(count_ == 1 ? static_cast<std::size_t>(config.window) + 1 : 0),
       track_update_(config, focal_px_),
       window_(config, focal_px_),
       frame_check_(config.feature_sigma_px, focal_px_),
@@ -51,13 +52,18 @@ void Cameras::measure_noise(const FeatureFrame& frame, const CameraState& camera
 
 Displacement Cameras::displacement(const FeatureFrame& frame, TimeNs t_ns, const ImuMotion& motion, const Ekf& ekf) {
   Displacement result;
-  if (ekf.state().imu.t_ns == compared_.t_ns) {  // else the frame before was not where the state is
-    const std::vector<StereoMatch>& matches = matches_.find(compared_.before, frame, ekf.state().camera);
-    compared_.matched_ns = compared_.before.t_ns;
-    compared_.seen =
-        stereo_motion(matches, ekf.state().camera, motion.T_BiBj, frame_check_.sigma(), kComparedStep, config_.kernels);
+  const State& x = ekf.state();
+  if (x.imu.t_ns == compared_.t_ns) {  // else the frame before was not where the state is
+    if (count_ > 1) {
+      const std::vector<StereoMatch>& matches = matches_.find(compared_.before, frame, x.camera);
+      compared_.matched_ns = compared_.before.t_ns;
+      compared_.seen =
+          stereo_motion(matches, x.camera, motion.T_BiBj, frame_check_.sigma(), kComparedStep, config_.kernels);
+      result.contradictory = !compared_.seen && matches.size() >= kFewFeatures;
+    } else if (!x.clones.empty() && x.clones.back().t_ns == x.imu.t_ns) {
+      compared_.seen = motion_by_one(frame, motion.T_BiBj, kComparedStep, ekf);
+    }
     result.available = compared_.seen.has_value();
-    result.contradictory = !compared_.seen && matches.size() >= kFewFeatures;
     if (compared_.seen) result.p_BiBj = compared_.seen->T_B0B1.p;
     if (compared_.seen) result.covariance = compared_.seen->p_covariance();
   }
@@ -82,17 +88,32 @@ const std::vector<StereoMatch>& Cameras::matches_with(const FeatureFrame& frame,
   return matches_.find(last_features_, frame, cameras);
 }
 
+/// All lengths that it shows are as uncertain as the way between both views.
+std::optional<StereoMotion> Cameras::motion_by_one(const FeatureFrame& frame, const Pose& start, double settled,
+                                                   const Ekf& ekf) {
+  if (!views_.find(ekf.state(), ekf.covariance(), start.p.norm())) return std::nullopt;
+  const CameraState& both = views_.cameras();
+  std::optional<StereoMotion> motion = stereo_motion(matches_.find(views_.features(), frame, both), both, start,
+                                                     frame_check_.sigma(), settled, config_.kernels);
+  if (!motion) return motion;
+  const Eigen::Vector3d& p = motion->T_B0B1.p;
+  motion->covariance.bottomRightCorner<3, 3>() += views_.scale_variance() * p * p.transpose();
+  return motion;
+}
+
 /// Images that are too unlike to show it have few features in common, by which a state that is far off would learn to
 /// be elsewhere.
 bool Cameras::bridge(const FeatureFrame& frame, Ekf& ekf) {
   const State& x = ekf.state();
   const std::optional<Pose> before = image_pose(x);
-  if (!before || count_ < 2 || x.clones.empty()) return false;
+  if (!before || count_ == 0 || x.clones.empty()) return false;
   const std::optional<StereoMotion> motion =
-      stereo_motion(matches_with(frame, x.camera), x.camera, motion_since(*before, x.imu), frame_check_.sigma());
+      count_ == 1
+          ? motion_by_one(frame, motion_since(x.clones.back().T_WB, x.imu), kComparedStep, ekf)
+          : stereo_motion(matches_with(frame, x.camera), x.camera, motion_since(*before, x.imu), frame_check_.sigma());
   if (motion) {
     apply_bridge(*motion, ekf);
-  } else {
+  } else if (count_ > 1) {
     while (!x.clones.empty()) ekf.marginalise(0);
     tracks_.clear();
   }
@@ -153,6 +174,7 @@ FrameAgreement Cameras::compare(const FeatureFrame& frame, const Ekf& ekf) {
 void Cameras::update(const FeatureFrame& frame, double weight, CameraUpdate calibration, Ekf& ekf, Records& records) {
   ekf.clone(frame_check_.noise(), weight);
   tracks_.add(ekf.state().clones.back().frame, frame.features);
+  if (count_ == 1) views_.add(ekf.state().clones.back().frame, frame.features);
   const std::optional<std::size_t> next = window_.to_marginalise(ekf.state(), tracks_);
   const UsedTracks ordinary = next && *next == 0 ? UsedTracks::oldest_too : UsedTracks::ended;
   const UsedTracks use = std::exchange(gap_is_wide_, false) ? UsedTracks::all : ordinary;
@@ -171,6 +193,7 @@ void Cameras::marginalise(std::optional<std::size_t> clone, Ekf& ekf) {
   if (!clone) return;
   if (*clone == 0) window_.set_updated(ekf.state().imu.t_ns);  // by all that reached back to it
   tracks_.forget_frame(ekf.state().clones[*clone].frame);
+  views_.forget(ekf.state().clones[*clone].frame);
   ekf.marginalise(*clone);
 }
 
@@ -194,6 +217,7 @@ bool Cameras::show_motion(const State& x) const {
 
 void Cameras::reset() {
   tracks_.clear();
+  views_.clear();
   track_update_.reset();
   window_.reset();
   compared_.t_ns = 0;

@@ -11,6 +11,7 @@
 #include "filter/ekf/imu_displacement.h"
 #include "filter/ekf/iterated_update.h"
 #include "filter/ekf/records.h"
+#include "filter/sources/cameras/earlier_views.h"
 #include "filter/sources/cameras/frame_check.h"
 #include "filter/sources/cameras/stereo_motion.h"
 #include "filter/sources/cameras/track_update.h"
@@ -46,8 +47,8 @@ class Cameras {
 
   /// Where the inertial samples since the last image may be wrong by more than noise (clipped, missing, stamps that
   /// jumped), the two images show how the body moved, roughly: later, the features of both will show it in full, around
-  /// a state that is near enough to be linear. False if they did not: where two cameras could have, clones and tracks
-  /// of before are gone then.
+  /// a state that is near enough to be linear. False if they did not: with two cameras, clones and tracks of before are
+  /// gone then.
   bool bridge(const FeatureFrame& frame, Ekf& ekf);
   /// At the state's time, which is the frame's, before the frame changes it: does it show the motion since the last
   /// image that the other sensors predict?
@@ -85,6 +86,9 @@ class Cameras {
     bool agrees = true;                ///< most features were where the state expected them
   };
 
+  /// From the newest clone to the frame, by one camera.
+  [[nodiscard]] std::optional<StereoMotion> motion_by_one(const FeatureFrame& frame, const Pose& start, double settled,
+                                                          const Ekf& ekf);
   /// Of the last image that was used with the frame at hand.
   const std::vector<StereoMatch>& matches_with(const FeatureFrame& frame, const CameraState& cameras);
   void apply_bridge(const StereoMotion& motion, Ekf& ekf);
@@ -94,6 +98,7 @@ class Cameras {
   std::size_t count_;
   double focal_px_;
   TrackTable tracks_;
+  EarlierViews views_;  ///< of one camera
   TrackUpdate track_update_;
   WindowRule window_;
   FrameCheck frame_check_;

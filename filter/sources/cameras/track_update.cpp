@@ -182,17 +182,10 @@ double TrackUpdate::left_out(const Track& track, double inverse_depth, bool agai
 }
 
 Eigen::Matrix3d TrackUpdate::way_covariance(int from, int to, bool again, const Ekf& ekf) const {
-  const Covariance& covariance = ekf.covariance();
-  const auto P = [&](int a, int b) -> ClonePair {
-    if (again) return covariance.corrected(err::clone(a), err::clone(b));
-    return covariance.matrix().block<err::clone_size, err::clone_size>(err::clone(a), err::clone(b));
+  const auto camera = [this](int clone) -> ClonePoint {
+    return {err::clone(clone), cameras_[2 * static_cast<std::size_t>(clone)].p_WC};
   };
-  Eigen::Matrix<double, 2 * err::clone_size, 2 * err::clone_size> P_both;
-  P_both << P(from, from), P(from, to), P(to, from), P(to, to);
-  const auto place = [this](int clone) { return skew(cameras_[2 * static_cast<std::size_t>(clone)].p_WC); };
-  Eigen::Matrix<double, 3, 2 * err::clone_size> J;  // by the errors of both clones
-  J << place(from), -Eigen::Matrix3d::Identity(), -place(to), Eigen::Matrix3d::Identity();
-  return J * P_both * J.transpose();
+  return ekf.covariance().of_way(camera(from), camera(to), again);
 }
 
 /// The newest that both cameras saw: what is wrong with the others is much the same.
