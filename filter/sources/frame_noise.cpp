@@ -13,7 +13,7 @@ struct Explained {
   double factor = 1.0;  ///< on the stated noise
 };
 
-/// `largest`: what an error of the sensor makes of it.
+/// `largest`: the most that an error of the sensor makes of it.
 Explained explain(const FrameNoise::Seen& seen, double largest) {
   Explained result;
   for (int axis = 0; axis < 3; ++axis) {
@@ -21,8 +21,9 @@ Explained explain(const FrameNoise::Seen& seen, double largest) {
     const double expected = seen.others(axis) + seen.believed * seen.believed * seen.noise(axis);
     if (square <= kClear * kClear * expected) continue;
     result.agrees = false;
-    const bool may_be = std::sqrt(square) < largest + kClear * std::sqrt(expected);
-    if (may_be) result.factor = std::max(result.factor, std::sqrt((square - seen.others(axis)) / seen.noise(axis)));
+    if (!(std::sqrt(square) < largest + kClear * std::sqrt(expected))) continue;
+    const double by_sensor = std::min(square - seen.others(axis), largest * largest);
+    result.factor = std::max(result.factor, std::sqrt(by_sensor / seen.noise(axis)));
   }
   return result;
 }

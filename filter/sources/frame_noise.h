@@ -39,8 +39,8 @@ class FrameNoise {
   /// last, by an error of the accelerometer. What has not agreed for kStale has another cause.
   void add_way(const Seen& way, double duration, TimeNs t_ns);
 
-  /// On the stated noise of the samples up to this frame, with which what is seen is a standard deviation; 1 where it
-  /// is within kClear of them, or no error of the sensor makes so much of it.
+  /// On the stated noise of the samples up to this frame, with which what is seen is a standard deviation, or what an
+  /// error of the sensor makes of it is; 1 where noise explains it, or no such error makes so much of it.
   [[nodiscard]] const ImuNoiseFactors& factors() const { return factors_; }
 
  private:

@@ -60,6 +60,7 @@ TEST_CASE("frame noise: a turn that noise does not explain is a standard deviati
   const double turn = 0.1 * kFrame;  // 0.1 rad/s
   const double factor = gyro_factor({0.0, 0.0, -turn});
   CHECK(std::hypot(kImages, factor * kSamples) == doctest::Approx(turn));
+  CHECK(kSamples * gyro_factor({0.0, 0.41 * kFrame, 0.0}) == doctest::Approx(0.4 * kFrame));  // no more than the most
   CHECK(gyro_factor({turn, 2.0 * turn, turn}) == doctest::Approx(gyro_factor({0.0, 2.0 * turn, 0.0})));
 }
 
