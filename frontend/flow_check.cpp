@@ -172,6 +172,15 @@ void FlowCheck::find_into(const std::vector<Flow>& flows, const MotionGuess& gue
     return used_;
   };
 
+  // The known turn, with the translation that two flows show by `solve`.
+  const auto with_turn = [&](auto* solve) {
+    return [&, solve](const std::array<std::size_t, 2>& s) -> std::optional<Transfer> {
+      const auto p = solve(flows, s[0], s[1], guess.motion.R_10);
+      if (!p) return std::nullopt;
+      return Transfer{guess.motion.R_10, *p};
+    };
+  };
+
   if (!metric) {
     if (!search_needed) return;
     problem.depth_sigma_unknown = 1e3;  // the translation has unit length: depths have no unit
@@ -179,14 +188,7 @@ void FlowCheck::find_into(const std::vector<Flow>& flows, const MotionGuess& gue
     all.resize(flows.size());
     std::iota(all.begin(), all.end(), std::size_t{0});
     if (guess.rotation_known) {
-      search<2>(
-          problem, all, random_,
-          [&](const std::array<std::size_t, 2>& s) -> std::optional<Transfer> {
-            const auto p = solve_direction(flows, s[0], s[1], guess.motion.R_10);
-            if (!p) return std::nullopt;
-            return Transfer{guess.motion.R_10, *p};
-          },
-          best, trial_);
+      search<2>(problem, all, random_, with_turn(&solve_direction), best, trial_);
     } else {
       search<5>(
           problem, all, random_,
@@ -200,14 +202,7 @@ void FlowCheck::find_into(const std::vector<Flow>& flows, const MotionGuess& gue
 
   const double settled = kSettled * tolerance_;
   if (search_needed && guess.rotation_known) {
-    search<2>(
-        problem, with_depth, random_,
-        [&](const std::array<std::size_t, 2>& s) -> std::optional<Transfer> {
-          const auto p = solve_translation(flows, s[0], s[1], guess.motion.R_10);
-          if (!p) return std::nullopt;
-          return Transfer{guess.motion.R_10, *p};
-        },
-        best, trial_);
+    search<2>(problem, with_depth, random_, with_turn(&solve_translation), best, trial_);
   } else if (search_needed) {
     search<3>(
         problem, with_depth, random_,

@@ -61,7 +61,7 @@ Displacement Cameras::displacement(const FeatureFrame& frame, TimeNs t_ns, const
           stereo_motion(matches, x.camera, motion.T_BiBj, frame_check_.sigma(), kComparedStep, config_.kernels);
       result.contradictory = !compared_.seen && matches.size() >= kFewFeatures;
     } else if (!x.clones.empty() && x.clones.back().t_ns == x.imu.t_ns) {
-      compared_.seen = motion_by_one(frame, motion.T_BiBj, kComparedStep, ekf);
+      compared_.seen = motion_by_one(frame, motion.T_BiBj, ekf);
     }
     result.available = compared_.seen.has_value();
     if (compared_.seen) result.p_BiBj = compared_.seen->T_B0B1.p;
@@ -89,12 +89,11 @@ const std::vector<StereoMatch>& Cameras::matches_with(const FeatureFrame& frame,
 }
 
 /// All lengths that it shows are as uncertain as the way between both views.
-std::optional<StereoMotion> Cameras::motion_by_one(const FeatureFrame& frame, const Pose& start, double settled,
-                                                   const Ekf& ekf) {
+std::optional<StereoMotion> Cameras::motion_by_one(const FeatureFrame& frame, const Pose& start, const Ekf& ekf) {
   if (!views_.find(ekf.state(), ekf.covariance(), start.p.norm())) return std::nullopt;
   const CameraState& both = views_.cameras();
   std::optional<StereoMotion> motion = stereo_motion(matches_.find(views_.features(), frame, both), both, start,
-                                                     frame_check_.sigma(), settled, config_.kernels);
+                                                     frame_check_.sigma(), kComparedStep, config_.kernels);
   if (!motion) return motion;
   const Eigen::Vector3d& p = motion->T_B0B1.p;
   motion->covariance.bottomRightCorner<3, 3>() += views_.scale_variance() * p * p.transpose();
@@ -109,7 +108,7 @@ bool Cameras::bridge(const FeatureFrame& frame, Ekf& ekf) {
   if (!before || count_ == 0 || x.clones.empty()) return false;
   const std::optional<StereoMotion> motion =
       count_ == 1
-          ? motion_by_one(frame, motion_since(x.clones.back().T_WB, x.imu), kComparedStep, ekf)
+          ? motion_by_one(frame, motion_since(x.clones.back().T_WB, x.imu), ekf)
           : stereo_motion(matches_with(frame, x.camera), x.camera, motion_since(*before, x.imu), frame_check_.sigma());
   if (motion) {
     apply_bridge(*motion, ekf);

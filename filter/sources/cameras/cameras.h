@@ -87,8 +87,7 @@ class Cameras {
   };
 
   /// From the newest clone to the frame, by one camera.
-  [[nodiscard]] std::optional<StereoMotion> motion_by_one(const FeatureFrame& frame, const Pose& start, double settled,
-                                                          const Ekf& ekf);
+  [[nodiscard]] std::optional<StereoMotion> motion_by_one(const FeatureFrame& frame, const Pose& start, const Ekf& ekf);
   /// Of the last image that was used with the frame at hand.
   const std::vector<StereoMatch>& matches_with(const FeatureFrame& frame, const CameraState& cameras);
   void apply_bridge(const StereoMotion& motion, Ekf& ekf);
