@@ -79,28 +79,32 @@ void MountingWatch::close_window() {
   contradicts_ = forwards_apart() || turns_apart();
 }
 
-/// Slopes are 1 where all is well, and less where wheels slip, but never backwards. Half of it or more to a side: axes
-/// are exchanged.
+/// Slopes are 1 where all is well, and less where wheels slip, but never backwards, ahead or to the left. Axes that are
+/// turned turn both alike: half of it or more to a side, and they are exchanged.
 bool MountingWatch::forwards_apart() const {
   if (moved_.count < kToKnow) return false;
-  // A velocity is ahead + i left: least squares over the slopes of the inertial one on the wheels' two parts. What
-  // never changed is not known: its slope has the standard deviation that so little gives.
+  // A velocity is ahead + i left: least squares over the slopes of the inertial one on the wheels' two parts, and on
+  // both together. What never changed is not known: its slope has the standard deviation that so little gives.
   Eigen::Matrix<std::complex<double>, 6, 3> parts = Eigen::Matrix<std::complex<double>, 6, 3>::Zero();
   parts(wheels_ahead, 0) = parts(inertial_ahead, 2) = 1.0;
   parts(wheels_left, 1) = parts(inertial_left, 2) = {0.0, 1.0};
   const Eigen::Matrix3cd products = parts.adjoint() * moved_.sum * parts;
   const double least = config_.speed_sigma * config_.speed_sigma;
-  const Eigen::Matrix2cd inverse = (products.topLeftCorner<2, 2>() + least * Eigen::Matrix2cd::Identity()).inverse();
+  const Eigen::Matrix2cd wheels = products.topLeftCorner<2, 2>() + least * Eigen::Matrix2cd::Identity();
   const Eigen::Vector2cd xy = products.topRightCorner<2, 1>();
+  const double yy = products(2, 2).real();
+  const auto doubt = [&](double left_over, double slopes, double inverse) {
+    return kClear * std::sqrt(std::max(0.0, left_over) / (2.0 * (moved_.count - slopes)) * inverse);
+  };
+  const Eigen::Matrix2cd inverse = wheels.inverse();
   const Eigen::Vector2cd slopes = inverse * xy;
-  const double left_over = products(2, 2).real() - xy.dot(slopes).real();
-  const double variance = std::max(0.0, left_over) / (2.0 * (moved_.count - 2.0));
   for (Eigen::Index i = 0; i < 2; ++i) {
-    const std::complex<double> slope = slopes(i);
-    const double doubt = kClear * std::sqrt(variance * inverse(i, i).real());
-    if (slope.real() + doubt < 0.0 || std::abs(slope.imag()) - doubt > std::max(0.5, slope.real())) return true;
+    if (slopes(i).real() + doubt(yy - xy.dot(slopes).real(), 2.0, inverse(i, i).real()) < 0.0) return true;
   }
-  return false;
+  const double both = wheels.sum().real();
+  const std::complex<double> slope = xy.sum() / both;
+  const double left_over = yy - std::norm(slope) * both;
+  return std::abs(slope.imag()) - doubt(left_over, 1.0, 1.0 / both) > std::max(0.5, slope.real());
 }
 
 /// The slope of the wheels' turns on the gyroscope's: wheels that scrub turn more, never against it. Radii and bias
