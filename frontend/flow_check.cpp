@@ -201,18 +201,22 @@ void FlowCheck::find_into(const std::vector<Flow>& flows, const MotionGuess& gue
   }
 
   const double settled = kSettled * tolerance_;
-  if (search_needed && guess.rotation_known) {
+  const auto refine = [&] {
+    prefer(problem, refine_motion(flows, best.flags, best.motion, kRefinements, settled), best, trial_);
+  };
+  if (search_needed && guess.rotation_known)
     search<2>(problem, with_depth, random_, with_turn(&solve_translation), best, trial_);
-  } else if (search_needed) {
+  // Gyroscope and prediction are not perfect: let the inliers correct them, then decide.
+  refine();
+  if (search_needed && (!guess.rotation_known || 2 * best.inliers <= flows.size())) {
     search<3>(
         problem, with_depth, random_,
         [&](const std::array<std::size_t, 3>& s) {
           return refine_motion(flows, flagged(s), guess.motion, kSteps, settled);
         },
         best, trial_);
+    refine();
   }
-  // Gyroscope and prediction are not perfect: let the inliers correct them, then decide.
-  prefer(problem, refine_motion(flows, best.flags, best.motion, kRefinements, settled), best, trial_);
   if (best.inliers < kMinFlows) return flags.assign(flows.size(), 0);
   result_.motion = best.motion;
   result_.metric = best.inliers >= kMinDepths && 2 * best.inliers > flows.size();

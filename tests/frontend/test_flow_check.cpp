@@ -75,6 +75,19 @@ TEST_CASE("flow check: with depth, what moves by itself is found, whatever is kn
     REQUIRE(c.metric);
     CHECK((c.motion.p_10 - example.motion.p_10).norm() < 0.003);
   }
+  SUBCASE("rotation known, but a gyroscope whose bias has jumped: off by a dozen pixels") {
+    for (int axis = 0; axis < 3; ++axis) {
+      CAPTURE(axis);
+      const Eigen::AngleAxisd off(12.0 * kPixel, Eigen::Vector3d::Unit(axis));
+      const Eigen::Matrix3d R_10 = example.motion.R_10 * off.toRotationMatrix();
+      const Consensus c = check.find(example.flows, {{R_10, Eigen::Vector3d::Zero()}, true, false});
+      const Score s = score(example, c.inliers);
+      CHECK(s.kept_static == 75);
+      CHECK(s.kept_moving == 0);
+      REQUIRE(c.metric);
+      CHECK((c.motion.R_10 - example.motion.R_10).norm() < 0.003);
+    }
+  }
   SUBCASE("nothing known") {
     const Consensus c = check.find(example.flows, {});
     const Score s = score(example, c.inliers);
