@@ -66,7 +66,7 @@ void Filter::propagate_to(const FeatureFrame& frame) {
   const TimeNs t_ns = begin_frame(frame);
   if (ekf_.running()) {
     consistency_ = consistency_check_(sources_.displacements(frame, t_ns, ingest_, ekf_, sources_.ground().known()));
-    take_in(sources_.score_imu(frame, consistency_.anomalous == MotionSensor::imu, ekf_, records_));
+    take_in(sources_.score_imu(frame, ekf_, records_));
     sources_.advance(t_ns, advice(), ingest_, ekf_, records_);
   }
   if (!ekf_.running() || health_.lost()) {

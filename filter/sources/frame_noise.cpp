@@ -35,13 +35,13 @@ ImuLimits imu_limits(const PriorConfig& prior) {
 }
 
 void FrameNoise::add_turn(const Seen& turn, double duration) {
-  factors_.gyro = explain(turn, accused_ ? INFINITY : limits_.gyro * duration).factor;
+  factors_.gyro = explain(turn, limits_.gyro * duration).factor;
 }
 
 void FrameNoise::add_way(const Seen& way, double duration, TimeNs t_ns) {
   const double since = agreed_ns_ ? seconds_between(*agreed_ns_, t_ns) : INFINITY;
-  const Explained explained = explain(way, accused_ ? INFINITY : limits_.accel * since * duration);
-  if (accused_ || since <= kStale) factors_.accel = explained.factor;
+  const Explained explained = explain(way, limits_.accel * since * duration);
+  if (since <= kStale) factors_.accel = explained.factor;
   if (explained.agrees || factors_.accel > 1.0) agreed_ns_ = t_ns;
 }
 

@@ -31,12 +31,8 @@ class FrameNoise {
     double believed = 1.0;                             ///< factor on that noise, by the last moments
   };
 
-  /// Another frame: nothing is known of its samples yet. `accused`: other sensors agree against them, so that whatever
-  /// is seen is theirs, however much.
-  void start_frame(bool accused) {
-    factors_ = {};
-    accused_ = accused;
-  }
+  /// Another frame: nothing is known of its samples yet.
+  void start_frame() { factors_ = {}; }
   /// The turn over `duration` [s]: by an error of the gyroscope's rate.
   void add_turn(const Seen& turn, double duration);
   /// The displacement over `duration` [s] to a frame at `t_ns`: by a velocity that is off, since displacements agreed
@@ -49,7 +45,6 @@ class FrameNoise {
 
  private:
   ImuLimits limits_;
-  bool accused_ = false;
   ImuNoiseFactors factors_;
   std::optional<TimeNs> agreed_ns_;  ///< a displacement, or noise has explained it
 };

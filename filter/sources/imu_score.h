@@ -41,8 +41,8 @@ class ImuScore {
   /// Where there is no camera: what the accelerometer's samples and the wheels show, as a factor. Images know better.
   /// Not the gyroscope's: wheels would turn the vehicle instead, whose track width is a guess.
   void set_unseen_accel(double factor) { unseen_accel_ = factor; }
-  /// Another frame, before anything is known of it. `accused`: wheels and cameras agree against its samples.
-  void start_frame(bool accused) { frame_.start_frame(accused); }
+  /// Another frame, before anything is known of it.
+  void start_frame() { frame_.start_frame(); }
   /// The motion from the state `x` to a frame at `t_ns` by the inertial samples, and as the images show it. `P`: of the
   /// state's error. By how much the cameras turned faster than the gyroscope of late [rad/s], in the mean, about the
   /// axis where it is least likely; nothing if the images show too little.

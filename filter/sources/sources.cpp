@@ -80,9 +80,9 @@ Displacements Sources::displacements(const FeatureFrame& frame, TimeNs t_ns, con
   return result;
 }
 
-ImuExcess Sources::score_imu(const FeatureFrame& frame, bool accused, const Ekf& ekf, Records& records) {
+ImuExcess Sources::score_imu(const FeatureFrame& frame, const Ekf& ekf, Records& records) {
   const std::optional<StereoMotion>& seen = cameras_.seen();
-  imu_score_.start_frame(accused);
+  imu_score_.start_frame();
   if (!seen) return {};
   const State& x = ekf.state();
   const std::optional<Innovation> turn = imu_score_.add(motion_, *seen, x, ekf.covariance(), frame.t_ns);

@@ -49,8 +49,8 @@ class Sources {
   [[nodiscard]] Displacements displacements(const FeatureFrame& frame, TimeNs t_ns, const Ingest& ingest,
                                             const Ekf& ekf, bool ground_known);
   /// After it: how noisy the inertial sensors are by what the images show of the same motion. What noise and the
-  /// state's own variances do not explain. `accused`: the displacements of wheels and cameras agree against theirs.
-  ImuExcess score_imu(const FeatureFrame& frame, bool accused, const Ekf& ekf, Records& records);
+  /// state's own variances do not explain.
+  ImuExcess score_imu(const FeatureFrame& frame, const Ekf& ekf, Records& records);
   /// Propagates to `t_ns`, with wheels (5)-(8) and lasers (2)-(4) in between: each at its own time, or, if the state
   /// has passed that already, where the state was then.
   void advance(TimeNs t_ns, const Advice& advice, Ingest& ingest, Ekf& ekf, Records& records);

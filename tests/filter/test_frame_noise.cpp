@@ -48,7 +48,7 @@ TEST_CASE("frame noise: what noise may explain changes nothing") {
   FrameNoise noise(kLimits);
   int more = 0;
   for (TimeNs k = 0; k < 2000; ++k) {
-    noise.start_frame(false);
+    noise.start_frame();
     noise.add_turn(seen({normal(rng), normal(rng), normal(rng)}), kFrame);
     noise.add_way(seen({normal(rng), normal(rng), normal(rng)}), kFrame, k * kFrameNs);
     more += noise.factors().gyro > 1.0 || noise.factors().accel > 1.0 ? 1 : 0;
@@ -85,32 +85,20 @@ TEST_CASE("frame noise: an accelerometer that stays wrong is followed frame by f
   FrameNoise wrong(kLimits), people(kLimits);
   for (TimeNs k = 0; k < 40; ++k) {
     const bool later = k >= 5;
-    wrong.start_frame(false);
+    wrong.start_frame();
     wrong.add_way(seen({later ? 0.0025 : 0.0, 0.0, 0.0}), kFrame, k * kFrameNs);
     CHECK((wrong.factors().accel > 1.0) == later);
-    people.start_frame(false);
+    people.start_frame();
     people.add_way(seen({later ? 1.5 * kFrame : 0.0, 0.0, 0.0}), kFrame, k * kFrameNs);  // 1.5 m/s
     CHECK(people.factors().accel == 1.0);
   }
-}
-
-TEST_CASE("frame noise: where other sensors agree against the samples, these are wrong by as much as is seen") {
-  FrameNoise noise(kLimits);
-  noise.start_frame(true);
-  noise.add_turn(seen({0.0, 2.0 * kFrame, 0.0}), kFrame);  // 2 rad/s
-  noise.add_way(seen({0.0, 0.0, 1.5 * kFrame}), kFrame, 0);
-  CHECK(std::hypot(kImages, noise.factors().gyro * kSamples) == doctest::Approx(2.0 * kFrame));
-  CHECK(std::hypot(kImages, noise.factors().accel * kSamples) == doctest::Approx(1.5 * kFrame));
-  noise.start_frame(false);
-  noise.add_turn(seen({0.0, 2.0 * kFrame, 0.0}), kFrame);
-  CHECK(noise.factors().gyro == 1.0);
 }
 
 TEST_CASE("frame noise: it is of one frame, and nothing that is no number gets into it") {
   FrameNoise noise(kLimits);
   noise.add_turn(seen({0.1 * kFrame, 0.0, 0.0}), kFrame);
   CHECK(noise.factors().gyro > 1.0);
-  noise.start_frame(false);
+  noise.start_frame();
   CHECK(noise.factors().gyro == 1.0);
   const double nan = std::numeric_limits<double>::quiet_NaN();
   noise.add_turn(seen({nan, 0.0, 0.0}), kFrame);

@@ -3,7 +3,6 @@
 
 #include <Eigen/Cholesky>
 #include <cstdint>
-#include <optional>
 #include <string>
 
 #include "tests/support/simulated_run.h"
@@ -26,9 +25,8 @@ constexpr double kFault = 20.0;  // [s]
 constexpr std::uint64_t kSeed = 831;
 
 simulator::Simulation simulate(const std::string& sequence, const std::string& fault, std::uint64_t seed,
-                               double duration, std::optional<double> calibration_error = std::nullopt) {
+                               double duration) {
   simulator::Options options;
-  options.calibration_error = calibration_error;
   options.sequence = sequence;
   options.seed = seed;
   options.duration = duration;
@@ -37,9 +35,8 @@ simulator::Simulation simulate(const std::string& sequence, const std::string& f
   return simulator::Simulation(options);
 }
 
-Outcome run(const std::string& sequence, const std::string& fault, std::uint64_t seed = kSeed,
-            std::optional<double> calibration_error = std::nullopt) {
-  const simulator::Simulation simulation = simulate(sequence, fault, seed, 35.0, calibration_error);
+Outcome run(const std::string& sequence, const std::string& fault, std::uint64_t seed = kSeed) {
+  const simulator::Simulation simulation = simulate(sequence, fault, seed, 35.0);
   Outcome outcome;
   TimeNs last_ns = 0;
   const Figures figures = measure(simulation, simulation.calibration(), FilterConfig{}, evaluation::AlignmentKind::yaw,
@@ -114,17 +111,6 @@ TEST_CASE("jumps: a bias of the accelerometer that jumps while hardly a track en
     CHECK(outcome.named);
     CHECK(outcome.false_tracking == 0.0);
     CHECK(outcome.lost == 0.0);
-  }
-}
-
-TEST_CASE("jumps: of both sensors by more than any bias, where wheels and cameras agree against them") {
-  for (const std::uint64_t seed : {971, 972, 973}) {
-    CAPTURE(seed);
-    const double clean = run("wave1", "", seed, 1.0).ate;
-    const Outcome outcome = run("wave1", "imu_bias_jump@20+5=0.3", seed, 1.0);  // 0.3 rad/s, 3 m/s^2
-    CHECK(outcome.ate < 4.0 * clean);
-    CHECK(outcome.named);
-    CHECK(outcome.false_tracking == 0.0);
   }
 }
 
