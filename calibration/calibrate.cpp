@@ -11,8 +11,9 @@
 namespace ear::calibration {
 namespace {
 
-constexpr double kGate = 6.0;     // [sigma] of wheels and beams, once there is a solution
-constexpr int kMost = 60;         // iterations: a minimum is found before
+constexpr double kGate = 6.0;  // [sigma] of wheels and beams, once there is a solution
+constexpr int kFirst = 16;     // iterations
+constexpr int kNext = 6;
 constexpr int kWhole = 3;         // rounds
 constexpr double kLasting = 1.1;  // of the features' errors, from which on they are weighed anew
 constexpr double kLeftOut = 4.0;  // [s] of a drive: standing before the start
@@ -27,12 +28,12 @@ std::vector<Entry> all_entries(const std::vector<CalibrationBlock>& blocks) {
 }
 
 /// To the minimum of what is built.
-void solve(Batch& batch, const Settings& settings, const std::string& what) {
+void solve(Batch& batch, const Settings& settings, int iterations, const std::string& what) {
   const auto told = [&](int iteration, double cost) {
     if (!settings.progress) return;
     settings.progress(what + ", step " + std::to_string(iteration) + ": " + std::to_string(cost));
   };
-  if (!batch.solve(kMost, settings.threads, told)) {
+  if (!batch.solve(iterations, settings.threads, told)) {
     throw std::runtime_error(
         "no minimum found: the sensors contradict each other, or the calibration given is too "
         "far off");
@@ -45,7 +46,8 @@ std::vector<Residual> minimise(Batch& batch, const Settings& settings) {
   for (int round = 0; round < settings.rounds; ++round) {
     batch.build(round == 0 ? 0.0 : kGate);
     if (round == 0) before = residuals_of(batch);
-    solve(batch, settings, "round " + std::to_string(round + 1) + " of " + std::to_string(settings.rounds));
+    solve(batch, settings, round == 0 ? kFirst : kNext,
+          "round " + std::to_string(round + 1) + " of " + std::to_string(settings.rounds));
     if (round + 1 < settings.rounds) batch.learn_noise();
   }
   return before;
@@ -97,7 +99,7 @@ Covariances weighed(Batch& batch, const Settings& settings) {
   if (first.lasting < kLasting || settings.rounds < kWhole) return first.covariances;
   batch.weigh_pixels(first.lasting);
   batch.build(kGate);
-  solve(batch, settings, "weight of features");
+  solve(batch, settings, kNext, "weight of features");
   return known(batch, settings).covariances;
 }
 

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
 
 #include "filter/ingest/limits.h"
 
@@ -48,12 +47,13 @@ bool SpikeWatch::add(ImuBuffer& samples, double dt, int lost, bool clips) {
     return false;
   }
 
-  if (!jumps) count(step, dt);
+  if (!jumps) {
+    count(step, dt);
+    if (last_change_) shared_ += (1.0 - std::exp(-dt / kStreamMemory)) * (change.dot(*last_change_) - shared_);
+  }
+  last_change_ = jumps ? std::nullopt : std::optional(change);
   const bool begins = jumps && samples.entry(1).noise.*factor_ == 1.0;
-  const bool doubtful = in_doubt() || begins;
-  if (last_change_) (doubtful ? doubt_.pairs : pairs_).add({change.dot(*last_change_), 1});
-  last_change_ = change;
-  if (doubtful) {
+  if (in_doubt() || begins) {
     hold(samples, dt, clips);
   } else if (jumps) {
     count(limit, dt);
@@ -114,12 +114,7 @@ void SpikeWatch::cross(ImuBuffer& samples, double dt, int lost) {
   last_change_.reset();
 }
 
-/// No mean over longer: a body that begins to shake is as noisy as that from its first sample on.
-double SpikeWatch::take_white() {
-  const Pairs taken = std::exchange(pairs_, {});
-  const double variance = taken.count > 0 ? std::max(0.0, -taken.sum) / (3.0 * taken.count) : 0.0;
-  return std::max(1.0, std::sqrt(variance) / sigma_);
-}
+double SpikeWatch::white() const { return std::max(1.0, std::sqrt(std::max(0.0, -shared_) / 3.0) / sigma_); }
 
 double SpikeWatch::held() const { return std::sqrt(step_variance_) / (3.0 * sigma_); }
 
@@ -129,7 +124,6 @@ void SpikeWatch::count(double step, double seconds) {
 
 void SpikeWatch::give_up(ImuBuffer& samples) {
   for (std::size_t i = 0; i < doubt_.length; ++i) samples.entry(doubt_.length - i).sample.*value_ = doubt_.measured[i];
-  pairs_.add(doubt_.pairs);
   doubt_ = {};
 }
 

@@ -50,9 +50,9 @@ class SpikeWatch {
   /// Factor on the noise for each interval for which a sample's value is held: the variance of the integral of the walk
   /// over n intervals is q n^3 / 3.
   [[nodiscard]] double held() const;
-  /// Factor on the noise, 1 or more, of the samples since it was last taken, by what two steps in a row share: the
-  /// white noise of the sample between them is in both, with opposite signs; of the body's motion there is little.
-  double take_white();
+  /// Factor on the noise, 1 or more, by what two steps in a row share: the white noise of the sample between them is in
+  /// both, with opposite signs; of the body's motion there is little.
+  [[nodiscard]] double white() const;
   /// The newest sample ends no spike, and those before it were none: a strike, which leaves them as uncertain as a
   /// spike.
   void give_up(ImuBuffer& samples);
@@ -60,15 +60,6 @@ class SpikeWatch {
  private:
   static constexpr std::size_t kLongest = 5;
 
-  /// Products of two steps in a row, all axes together.
-  struct Pairs {
-    double sum = 0.0;
-    int count = 0;
-    void add(const Pairs& more) {
-      sum += more.sum;
-      count += more.count;
-    }
-  };
   /// What may be a spike.
   struct Doubt {
     std::array<Eigen::Vector3d, kLongest> measured;
@@ -76,7 +67,6 @@ class SpikeWatch {
     std::size_t lost = 0;  ///< samples that did not come meanwhile
     double seconds = 0.0;  ///< from the sample before it to its newest
     bool clipped = false;  ///< one of them
-    Pairs pairs;           ///< noise, if it is none
   };
 
   void hold(ImuBuffer& samples, double dt, bool clips);
@@ -91,8 +81,8 @@ class SpikeWatch {
   double sigma_, least_, least_rate_;
   bool strikes_;
   double step_variance_;                        ///< of the recent steps between samples, all axes together
-  std::optional<Eigen::Vector3d> last_change_;  ///< the step before the newest, if it was measured
-  Pairs pairs_;                                 ///< since they were last taken
+  std::optional<Eigen::Vector3d> last_change_;  ///< the step before the newest, if it was the body's
+  double shared_ = 0.0;                         ///< mean product of two steps in a row, all axes together
   Doubt doubt_;
 };
 
@@ -109,8 +99,8 @@ class ImuSpikes {
   [[nodiscard]] bool in_doubt() const { return gyro_.in_doubt() || accel_.in_doubt(); }
   /// Factors on the noise, per interval for which the values of a sample are held.
   [[nodiscard]] ImuNoiseFactors held() const { return {gyro_.held(), accel_.held()}; }
-  /// Factor on the accelerometer's noise, 1 or more, as its samples show it since it was last taken.
-  double take_white_accel() { return accel_.take_white(); }
+  /// Factor on the accelerometer's noise, 1 or more, as its samples show it.
+  [[nodiscard]] double white_accel() const { return accel_.white(); }
   /// The newest came after a gap in which anything may have happened.
   void give_up(ImuBuffer& samples);
 

@@ -80,8 +80,8 @@ class Ingest {
   /// Are the newest inertial samples in doubt? They may be those of a spike, whose end the next few show. A state that
   /// goes on without an image waits for it: none would put right what it takes of them.
   [[nodiscard]] bool waits_for_imu(std::optional<TimeNs> state_ns) const;
-  /// Factor on the accelerometer's white noise, 1 or more, as its samples show it since this was last asked.
-  double take_white_accel() { return spikes_.take_white_accel(); }
+  /// Factor on the accelerometer's white noise, 1 or more, as its samples show it.
+  [[nodiscard]] double white_accel() const { return spikes_.white_accel(); }
   [[nodiscard]] ImuInterruption& interruption() { return interruption_; }
   [[nodiscard]] InputCounts counts() const;
 

@@ -92,7 +92,7 @@ ImuExcess Sources::score_imu(const FeatureFrame& frame, const Ekf& ekf, Records&
 
 void Sources::advance(TimeNs t_ns, const Advice& advice, Ingest& ingest, Ekf& ekf, Records& records) {
   if (cameras_.count() == 0) {
-    imu_score_.set_unseen_accel(std::max(ingest.take_white_accel(), wheels_ ? wheels_->accel_noise() : 1.0));
+    imu_score_.set_unseen_accel(std::max(ingest.white_accel(), wheels_ ? wheels_->accel_noise() : 1.0));
   }
   while (const std::optional<Measurement> z = ingest.next(t_ns, ekf.state().odometer.time_offset)) {
     propagate(z->t_ns, advice, ingest, ekf);
