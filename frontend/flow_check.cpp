@@ -201,6 +201,7 @@ void FlowCheck::find_into(const std::vector<Flow>& flows, const MotionGuess& gue
   }
 
   const double settled = kSettled * tolerance_;
+  const auto by_majority = [&] { return 2 * best.inliers > flows.size(); };
   const auto refine = [&] {
     prefer(problem, refine_motion(flows, best.flags, best.motion, kRefinements, settled), best, trial_);
   };
@@ -208,7 +209,7 @@ void FlowCheck::find_into(const std::vector<Flow>& flows, const MotionGuess& gue
     search<2>(problem, with_depth, random_, with_turn(&solve_translation), best, trial_);
   // Gyroscope and prediction are not perfect: let the inliers correct them, then decide.
   refine();
-  if (search_needed && (!guess.rotation_known || 2 * best.inliers <= flows.size())) {
+  if (search_needed && (!guess.rotation_known || !by_majority())) {
     search<3>(
         problem, with_depth, random_,
         [&](const std::array<std::size_t, 3>& s) {
@@ -219,7 +220,7 @@ void FlowCheck::find_into(const std::vector<Flow>& flows, const MotionGuess& gue
   }
   if (best.inliers < kMinFlows) return flags.assign(flows.size(), 0);
   result_.motion = best.motion;
-  result_.metric = best.inliers >= kMinDepths && 2 * best.inliers > flows.size();
+  result_.metric = best.inliers >= kMinDepths && by_majority();
 }
 
 }  // namespace ear

@@ -93,18 +93,19 @@ bool MountingWatch::forwards_apart() const {
   const Eigen::Matrix2cd wheels = products.topLeftCorner<2, 2>() + least * Eigen::Matrix2cd::Identity();
   const Eigen::Vector2cd xy = products.topRightCorner<2, 1>();
   const double yy = products(2, 2).real();
-  const auto doubt = [&](double left_over, double slopes, double inverse) {
-    return kClear * std::sqrt(std::max(0.0, left_over) / (2.0 * (moved_.count - slopes)) * inverse);
+  const auto doubt = [&](double left_over, double fitted, double inverse) {
+    return kClear * std::sqrt(std::max(0.0, left_over) / (2.0 * (moved_.count - fitted)) * inverse);
   };
   const Eigen::Matrix2cd inverse = wheels.inverse();
   const Eigen::Vector2cd slopes = inverse * xy;
+  const double left_over = yy - xy.dot(slopes).real();
   for (Eigen::Index i = 0; i < 2; ++i) {
-    if (slopes(i).real() + doubt(yy - xy.dot(slopes).real(), 2.0, inverse(i, i).real()) < 0.0) return true;
+    if (slopes(i).real() + doubt(left_over, 2.0, inverse(i, i).real()) < 0.0) return true;
   }
   const double both = wheels.sum().real();
   const std::complex<double> slope = xy.sum() / both;
-  const double left_over = yy - std::norm(slope) * both;
-  return std::abs(slope.imag()) - doubt(left_over, 1.0, 1.0 / both) > std::max(0.5, slope.real());
+  const double aside = std::abs(slope.imag()) - doubt(yy - std::norm(slope) * both, 1.0, 1.0 / both);
+  return aside > std::max(0.5, slope.real());
 }
 
 /// The slope of the wheels' turns on the gyroscope's: wheels that scrub turn more, never against it. Radii and bias
